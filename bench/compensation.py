@@ -4,6 +4,10 @@ What comes out is measured by another program too: the reader of G-code and the 
 cuts one period between mirror planes, away from the middle of the bed, where Cura changes the side that it thins.
 """
 
+import os
+
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # threads that wait for a core would count as time
+
 import sys
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage

@@ -45,7 +45,7 @@ def whole(file, jobs=2):
     yield from (f"{count} {why} ({'certified' if proof else 'by the models'})" for why, proof, count in found.reasons())
     for row in found.front:
         numbers = row.trial.printed
-        yield f"{row.candidate.values}: {numbers.force_resolution.words()}, {numbers.position_resolution.words()}"
+        yield f"{row.values}: {numbers.force_resolution.words()}, {numbers.position_resolution.words()}"
 
 
 def work(step, *given):

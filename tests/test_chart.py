@@ -144,39 +144,47 @@ def test_textbook_scenes_are_met():
         assert errors[0] / errors[1] > 6
 
 
-def test_rungs_go_on_until_it_costs_too_much(monkeypatch):
-    asked = []
+def widths(work, seconds=lambda _: 1e-6, width=1e-3):
+    """Widths that a model is asked for, and those that it gives bounds for."""
+    asked, standard = [], SimpleNamespace(scene=None, permittivity=None)
 
-    def work(wanted):
-        asked.append(wanted)
-        return Interval(1 - wanted / 4, 1 + wanted / 4)
+    def capacitance(scene, permittivity, *wanted):
+        asked.extend(wanted)
+        return work(*wanted)
 
-    monkeypatch.setattr(cells, "timed", lambda work: (work(), 10.0 ** len(asked) / 1e4))
-    model = type("Model", (), {"WIDTH": 1e-3})
-    rungs = list(cells._rungs(work, (), model, 1.0))
+    model = SimpleNamespace(WIDTH=width, capacitance=capacitance)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measured_in, "timed", lambda work: (work(), seconds(asked)))
+        return asked, [wanted for wanted, _, _ in measured_in.climb(cells._widths(model, standard), 1.0)]
+
+
+def around_one(wanted):
+    return Interval(1 - wanted / 4, 1 + wanted / 4)
+
+
+def test_widths_go_on_until_it_costs_too_much():
+    asked, given = widths(around_one, lambda asked: 10.0 ** len(asked) / 1e4)
     assert asked == pytest.approx([0.1, 1e-2, 1e-3, 1e-4])  # the last took 1 s: ten times that is over the budget
-    assert [wanted for wanted, _, _ in rungs] == asked
+    assert given == asked
 
 
-def test_rungs_end_where_nothing_is_gained(monkeypatch):
-    monkeypatch.setattr(cells, "timed", lambda work: (work(), 1e-6))
-    model = type("Model", (), {"WIDTH": 1e-3})
-    assert len(list(cells._rungs(lambda wanted: Interval(0.9, 1.1), (), model, 1.0))) == 1
-    assert len(list(cells._rungs(lambda wanted: Interval(1.0, 1.0), (), model, 1.0))) == 1
-    assert [
-        w for w, _, _ in cells._rungs(lambda: Interval(0.9, 1.1), (), type("Model", (), {"WIDTH": math.inf}), 1.0)
-    ] == [None]
+def test_widths_end_where_nothing_is_gained():
+    for low, high in ((0.9, 1.1), (1.0, 1.0)):
+        assert widths(lambda _, ends=(low, high): Interval(*ends))[1] == [0.1]
+    asked, given = widths(lambda _: Interval(0.97, 1.03))
+    assert (asked, given) == ([0.1, 0.01], [0.1])  # the second is no narrower
+    assert widths(lambda: Interval(0.9, 1.1), width=math.inf) == ([], [None])
 
 
-def test_rungs_go_on_where_the_first_one_fails(monkeypatch):
+def test_widths_go_on_where_the_first_one_fails():
     def work(wanted):
         if wanted > 0.05 or wanted < 5e-3:
             raise SensorgenError("the solver failed")
-        return Interval(1 - wanted / 4, 1 + wanted / 4)
+        return around_one(wanted)
 
-    monkeypatch.setattr(cells, "timed", lambda work: (work(), 1e-6))
-    model = type("Model", (), {"WIDTH": 1e-3})
-    assert [wanted for wanted, _, _ in cells._rungs(work, (), model, 1.0)] == pytest.approx([1e-2])
+    asked, given = widths(work)
+    assert asked == pytest.approx([0.1, 1e-2, 1e-3])
+    assert given == pytest.approx([1e-2])
 
 
 @pytest.fixture(scope="module")

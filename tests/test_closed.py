@@ -9,6 +9,7 @@ from sensorgen.design.design import make
 from sensorgen.models import closed
 from sensorgen.prediction.capacitance import Answer
 from sensorgen.prediction.compression_law import law_of
+from sensorgen.prediction.mesh_ladder import drawn
 from sensorgen.scene.scene import Body, Scene, box
 
 EPS0, X60, E_PA = 8.8541878128e-12, 4.68, 6e6
@@ -66,5 +67,8 @@ def test_a_cell_of_which_the_solution_ends_has_an_interval(monkeypatch, tmp_path
     assert 1.5 < most.ratio[-1] < 4.5
     assert "from 10 to 1100 kPa the rise of C lies between none more" in law.doubts[-1]
     assert {top.stress_pa[-1] for top in law.tops.values()} == {1.1e6}
+    answer = Answer("columns", Interval(1e-10, 2e-10), ())
+    otherwise = celllaw.at_a_few_pressures(cell, drawn(cell), answer, 1.1e6)  # ways to print differ, and end as early
+    assert otherwise.compression.stress_pa == (0.0, 5e3, 1e4, 1.1e6)
     usual = law_of(cell, Answer("columns", Interval(1e-10, 2e-10), ()), "solved", until_pa=1e4)
     assert (usual.of_mesh, usual.compression.stress_pa[-1]) == ((), 1e4)

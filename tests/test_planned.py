@@ -1,7 +1,9 @@
 """Predictions as near as asked: what is planned, what it comes to, and whether the truth is within it."""
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -50,6 +52,18 @@ def test_without_an_accuracy_no_cell_is_solved_in_3d():
     assert chosen(plan)["compression"] == "nearest prototype"
     assert not sensed.law.bounded
     assert "--compression solved" in sensed.law.doubts[0]
+
+
+def test_a_cell_in_3d_has_an_interval_far_beyond_its_prototype():
+    """At 700 kPa: the rise by another program, neo-Hookean on two meshes, lies within."""
+    large = json.loads((Path(__file__).parent / "reference" / "rect_rise.json").read_text("utf-8"))["large"]
+    cell = make({"shape": "rect", "parameters": {k: v for k, v in large.items() if k != "meshes"}})
+    exact = large["meshes"][-1]["loads"][-1]
+    law = worked_out(cell, None, Press(TONES, exact["pressure_kpa"] * 1e3 * 1e-4, 0.05))[0].law  # on 1 cm2
+    least, most = (float(1 / (1 - c.capacitive_strain(exact["pressure_kpa"] * 1e3)[0]) - 1) for c in law.others)
+    assert law.bounded
+    assert least < 0.01 < exact["rise"] < most < 4
+    assert any("none and that of the closed cell" in doubt for doubt in law.doubts)
 
 
 def test_the_cheapest_of_each_level_is_taken_and_the_whole_holds_the_truth():

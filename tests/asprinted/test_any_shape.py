@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from sensorgen.asprinted import window
-from sensorgen.asprinted.beads import Beads, layers
+from sensorgen.asprinted.beads import Beads, _closed, layers
 from sensorgen.asprinted.printed import gap_mm
 from sensorgen.checks import estimate
 from sensorgen.design import shape_files
@@ -190,3 +190,16 @@ def test_a_shape_of_ones_own_is_sliced_and_read(pattern, slicer, tmp_path):
     meant = prisms.capacitance(design.in_use, eps, 0.1)
     assert found.middle() * printed.cells.count == pytest.approx(meant.middle(), rel=0.06)
     assert not any(printed.cells.remarks.values())
+
+
+@pytest.mark.parametrize("degrees", [0, 90, 45, 135, 20])
+def test_lines_of_every_direction_unite_to_what_geos_unites(degrees):
+    """Of 400 long lines and 100 across; each way is turned by another multiple of 45 degrees for Clipper's sweep."""
+    rng = np.random.default_rng(degrees)
+    angle = np.radians(np.where(np.arange(500) < 400, degrees, degrees + 90))
+    way = np.column_stack([np.cos(angle), np.sin(angle)]) * np.where(np.arange(500) < 400, 8.0, 2.0)[:, None]
+    start = rng.uniform(0, 60, (500, 2))
+    plans = shapely.buffer(shapely.linestrings(np.stack([start, start + way], axis=1)), 0.25, quad_segs=4)
+    united, other = _closed(plans, 1e-6, way), shapely.union_all(plans)
+    assert shapely.symmetric_difference(shapely.make_valid(united), other).area < 1e-3
+    assert united.area == pytest.approx(other.area, rel=1e-6)

@@ -96,7 +96,7 @@ def test_the_piece_of_a_plate_that_has_a_fault_is_named(made, tmp_path):
         assert len(pieces(design, motion)) == 3
         faults = [f for f in agreement.check_motion(design, motion) if f.rule == "volume"]
         assert faults
-        assert all(re.match(rf"piece \d of 3, {at}: .* mm3 in layer", f.message) for f in faults), faults
+        assert all(re.match(rf"piece \d of 3, {at} on the bed: .* mm3 in layer", f.message) for f in faults), faults
     with_all = agreement.check_motion(design, follow("".join(turns).encode()))
     assert not [f for f in with_all if f.rule in ("volume", "material", "place", "width")]
 

@@ -124,9 +124,9 @@ def test_the_gap_is_the_film(shape, film_mm, turned):
     assert electrode_gap_mm(scene, made(scene)) == pytest.approx(film_mm, abs=1e-12)
 
 
-def test_the_gap_is_measured_across_a_corner():
-    """Two cubes apart by 3 along x and by 4 along z are apart by 5."""
+@pytest.mark.parametrize(("along_x", "along_z", "gap"), [(3, 4, 5.0), (12, 5, 13.0)])  # less and more than the height
+def test_the_gap_is_measured_across_a_corner(along_x, along_z, gap):
     low = Body("low", "etpu", (box(0, 1, 0, 1, 0, 1),), "bottom")
-    high = Body("high", "etpu", (box(4, 5, 0, 1, 5, 6),), "top")
-    scene = Scene((low, high), (5, 1, 6))
-    assert electrode_gap_mm(scene, made(scene)) == pytest.approx(5.0, abs=1e-12)
+    high = Body("high", "etpu", (box(1 + along_x, 2 + along_x, 0, 1, 1 + along_z, 2 + along_z),), "top")
+    scene = Scene((low, high), (2 + along_x, 1, 2 + along_z))
+    assert electrode_gap_mm(scene, made(scene)) == pytest.approx(gap, abs=1e-12)

@@ -56,6 +56,7 @@ _STRAIN = np.linspace(0.0, 0.3, 7)  # of infill: lines of its law, which is stra
 _SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cell, 0.45 deforms by 11 % more
 _ENOUGH = 0.5  # of the last of them: a curve that is known so far is extended [-]
 _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 0.2 mm from 0.5 kPa on
+_NONE = 1e-6  # share of a rise that stands for none: curves rise [-]
 _LIKE = {"press2d": "tri", "press3d": "rect", "press_round": "tri"}  # prototypes that other cells should resemble
 
 
@@ -208,6 +209,48 @@ def expected(design: Design, mesh: MeshLevel) -> CapacitanceCurve:
     modulus_pa = of_all_materials(design, "youngs_modulus_pa")[film(design)].value
     scale = max(modulus_pa / compression.PROTOTYPE_PA, 1 / compression.REACH)  # softer ones could not be extrapolated
     return replace(compression.prototype(_LIKE[mesh.model]).scaled_modulus(scale), within=mesh.rise_error)
+
+
+def nearest(design: Design, piece: PressedPiece, answer: Answer, until_pa: float) -> Law:
+    """The nearest prototype's law for an unsolved cell in 3D, its error unknown up to the last pressure it is used for.
+
+    Beyond that one the cell lies between no rise at all and the closed cell, whose error is bounded.
+
+    Parameters
+    ----------
+    design, piece
+        Whose cell it is, drawn or printed.
+    answer : Answer
+        Capacitance of the whole sensor, unloaded.
+    until_pa : float
+        Pressure up to which it is wanted [Pa].
+    """
+    from sensorgen.models import closed
+    from sensorgen.models.press2d import BoundaryConditions
+
+    like = expected(design, mesh_levels(piece, "press3d", 1)[0])
+    law, last_pa = _cell(like, of_all_materials(design, "youngs_modulus_pa")), like.stress_pa[-1]
+    if until_pa <= compression.REACH * last_pa:
+        return replace(law, bounded=False)
+    case = _case(design, piece, "press3d", BoundaryConditions())
+    area_m2 = design.params.length_mm * design.params.width_mm * M_PER_MM**2
+    softest_pa = min(case.solids[b.material].youngs_modulus_pa for b in piece.scene.bodies if not b.terminal)
+    loads = (*like.stress_pa[1:], until_pa)
+    try:
+        closed_f = [closed.most_f_per_m2(piece.scene, case.permittivity, softest_pa, p) * area_m2 for p in loads]
+    except ValueError:
+        return replace(law, bounded=False)
+    most = compression.curve(
+        like.name, closed.SOURCE, (0.0, *loads), (1.0, *(c / answer.capacitance_f.lower for c in closed_f))
+    )
+    slope = min(like.slope_per_pa[-1], max(0.0, most.ratio[-1] - like.ratio[-1]) / (until_pa - last_pa))
+    between = extended(like, until_pa, slope)
+    doubt = (
+        f"up to {until_pa / 1e3:.4g} kPa, where no cell like it was solved, the rise of C lies between none and that "
+        f"of the closed cell, {100 * (most.ratio[-1] - 1):.3g} %"
+    )
+    others = between.scaled_rise(_NONE), most
+    return replace(law, compression=between, doubts=(*law.doubts, doubt), others=others, of_mesh=others)
 
 
 def infill(design: Design, piece: PressedPiece) -> Law | None:
@@ -552,17 +595,23 @@ def at_a_few_pressures(
         return known
     model = model_of(printed, quick=True)
     if model == "press3d":
-        return infill(design, printed)
+        law = infill(design, printed) or nearest(design, printed, answer, stress_pa)
+        return law if law.bounded else None
+    loads, usual = [stress_pa * part for part in (0, 0.5, 1, _PAST)], stresses_pa(stress_pa)[-1] * np.array(_COARSE)
+    if stress_pa > _PAST * STRESS_PA[-1]:
+        loads = [STRESS_PA[-1] * part for part in (0, 0.5, 1)]
+    elif not tip.soft and stress_pa in usual:
+        loads = usual.tolist()
     try:
         case = case_of(design, printed, model, tip)
-        usual = (stresses_pa(stress_pa)[-1] * np.array(_COARSE)).tolist()
-        own = [stress_pa * part for part in (0, 0.5, 1, 1.25)]
-        solution = pressed(case, own if tip.soft or stress_pa not in usual else usual, level)
+        solution = pressed(case, loads, level)
         curve = curve_of(solution)
     except SensorgenError:
         return None
     fallen_m = float(solution.displacement_m[-1]) - solution.fall_m
-    return replace(known, compression=replace(curve, displacement_m=fallen_m), doubts=())
+    curve = replace(curve, displacement_m=fallen_m)
+    law, at_rest = replace(known, compression=curve, doubts=()), solution.capacitance_f_per_m2[0]
+    return _further(law, curve, {}, replace(case, piece=printed), stress_pa, at_rest)
 
 
 def _case(design: Design, piece: PressedPiece, model: str, boundary: "BoundaryConditions") -> Case:

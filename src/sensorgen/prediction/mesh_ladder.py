@@ -4,6 +4,7 @@ The error of a mesh is estimated from the next coarser one, whose triangles are 
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from importlib import import_module
@@ -289,15 +290,26 @@ def estimated(
     """
     fine = pressed(case, stress_pa, level, keep=keep, step=step)
     fine = fine.sound() if sound else fine
-    last = len(fine.stress_pa) - 1
-    shared = sorted({0, min(1, last), *range(last, 0, -_APART)})
-    some = [float(fine.stress_pa[k]) for k in shared]
-    alone = last == 0 or _size(case.model, level - 1) == inf
-    coarse = fine.first(1) if alone else pressed(case, some, level - 1, keep=keep).sound()
-    if not alone and coarse.stress_pa[-1] < some[-1]:  # shorter steps
-        coarse = pressed(case, [float(p) for p in fine.stress_pa], level - 1, keep=keep).sound()
+    coarse = _coarser(case, fine, stress_pa, level, keep=keep)
     coarse = coarse.some(np.flatnonzero(np.isin(coarse.stress_pa, fine.stress_pa)).tolist())
     return (_limit if case.model == "press3d" else _errors)(case, fine, coarse, level)
+
+
+def _coarser(case: Case, fine: "Pressed", stress_pa: Sequence[float], level: int, *, keep: bool) -> "Pressed":
+    """Solution on the next coarser mesh at some pressures of a finer one; unloaded where there is no such mesh."""
+    last = len(fine.stress_pa) - 1
+    if last == 0 or _size(case.model, level - 1) == inf:
+        return fine.first(1)
+    some = [float(fine.stress_pa[k]) for k in sorted({0, min(1, last), *range(last, 0, -_APART)})]
+    with suppress(cached.Unknown), cached.only_known():
+        if keep:  # the level before was not accurate enough: it is stored
+            known = pressed(case, stress_pa, level - 1).sound()
+            whole = known.stress_pa[-1] >= some[-1]
+            return known.some(np.flatnonzero(np.isin(known.stress_pa, some)).tolist()) if whole else known
+    coarse = pressed(case, some, level - 1, keep=keep).sound()
+    if coarse.stress_pa[-1] < some[-1]:  # shorter steps
+        coarse = pressed(case, [float(p) for p in fine.stress_pa], level - 1, keep=keep).sound()
+    return coarse
 
 
 def limit(fine: "Pressed", coarse: "Pressed", pieces: int) -> Estimate:

@@ -13,7 +13,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.capacitance import Answer, default_width, weighed
-from sensorgen.prediction.compression_law import Law, LawOption, infill, options
+from sensorgen.prediction.compression_law import Law, LawOption, infill, nearest, options
 from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_until_within
 from sensorgen.prediction.query import DEFAULT, FLAT, Load, Query, Tip
 from sensorgen.prediction.reference_load import ReferenceLoad
@@ -103,7 +103,7 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
 
     def laws(answer: Answer) -> list[LawOption]:
         available = options(body.design, answer, law, printed=printed, tip=tip, until_pa=until_pa)
-        return available if thorough else _inexpensive(available, body)
+        return available if thorough else _inexpensive(available, body, answer, until_pa)
 
     width = min(wanted, 2 * share / by_capacitance, default_width(body.cells.first()))
     levels = (_cell(rough, width), _compression(laws(rough.rest.answer), sensor, load, share), line)
@@ -111,7 +111,9 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
     return PredictionPlan(body, load, tip, laws, rough, by_capacitance, Plan(wanted, at, levels))
 
 
-def _inexpensive(available: list[LawOption], body: Body) -> list[LawOption]:
+def _inexpensive(
+    available: list[LawOption], body: Body, answer: Answer, until_pa: float
+) -> list[LawOption]:  # fmt: skip
     """Without cells in 3D: in their place infill's law, else the nearest prototype's, of unknown error."""
     spatial = [option for option in available if option.name.startswith("press3d")]
     if not spatial:
@@ -120,9 +122,9 @@ def _inexpensive(available: list[LawOption], body: Body) -> list[LawOption]:
     law = infill(body.design, piece(body))
     if law:
         name, remark = law.compression.name, "compression of infill, between standing columns and flat levels"
-    known = law or replace(spatial[0].expected, bounded=False)
+    known = law or nearest(body.design, piece(body), answer, until_pa)
     remark += f": solving this cell takes some {spatial[0].seconds:.0f} s (predict --compression solved)"
-    known = replace(known, doubts=(remark,))
+    known = replace(known, doubts=(*known.doubts, remark))
     return [LawOption(name, 0.0, known, lambda: known)]
 
 

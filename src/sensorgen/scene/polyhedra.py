@@ -1,6 +1,6 @@
 """Bodies with flat faces: closed triangle meshes, and lofts between outlines at two heights."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import hypot, inf, isfinite
@@ -16,6 +16,7 @@ from sensorgen.scene.scene import (
     Place,
     Point,
     area_mm2,
+    between,
     described,
     is_rectangle,
     rounded,
@@ -81,7 +82,7 @@ class Polyhedron:
         x0 = self.vertices[0][0]
         flux = []  # of the field (x, 0, 0), which level faces do not pass
         for triangle in self.triangles:
-            corners = between([self.vertices[number] for number in triangle], low_mm, high_mm)
+            corners = between([self.vertices[number] for number in triangle], 2, low_mm, high_mm)
             for k in range(1, len(corners) - 1):
                 (xa, ya, za), (xb, yb, zb), (xc, yc, zc) = corners[0], corners[k], corners[k + 1]
                 normal = (yb - ya) * (zc - za) - (zb - za) * (yc - ya)
@@ -145,20 +146,6 @@ def _rings(after: dict[tuple[int, int], tuple[int, int]]) -> Iterator[list[tuple
             ring.append(place)
             place = after.pop(place)
         yield ring
-
-
-def between(corners: Sequence[Place], low_mm: float, high_mm: float) -> Sequence[Place]:
-    """Part of a flat polygon between two heights (Sutherland and Hodgman, 1974)."""
-    for side, level in ((1.0, low_mm), (-1.0, high_mm)):
-        inside: list[Place] = []
-        for a, b in zip([*corners[-1:], *corners[:-1]], corners, strict=True):
-            if (side * (a[2] - level) >= 0) != (side * (b[2] - level) >= 0):
-                share = (level - a[2]) / (b[2] - a[2])
-                inside.append((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), level))
-            if side * (b[2] - level) >= 0:
-                inside.append(b)
-        corners = inside
-    return corners
 
 
 def _without_holes(loops: list[Outline]) -> list[Outline]:

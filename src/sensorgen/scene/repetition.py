@@ -14,7 +14,7 @@ from shapely.affinity import scale, translate
 
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.layers import Region
-from sensorgen.scene.scene import Body, Scene
+from sensorgen.scene.scene import Body, Piece, Scene
 from sensorgen.scene.sections import ROUNDING_MM
 from sensorgen.scene.unit_cell import Band, Slice, affordable
 
@@ -230,10 +230,28 @@ def raster(
     pieces = [(body, p) for body in scene.bodies for p in body.pieces]
     if not all(p.is_box() for _, p in pieces):
         raise ValueError("not all of it is boxes")
-    planes: list[Real] = []
-    for axis, outer in zip("xyz", outer_mm, strict=True):
-        edges = np.unique(np.array([*outer, *(x for _, p in pieces for x in p.span(axis))]))
-        planes.append(edges[np.diff(edges, prepend=-np.inf) > ROUNDING_MM])
+    planes = [_planes([p for _, p in pieces], *each) for each in zip("xyz", outer_mm, strict=True)]
+    fill = _filled(pieces, planes, number)
+    fill[fill < 0] = air
+    shares = []
+    for k in (0, 1):
+        cell = affordable(_walk(fill, planes[k], k), evenly)
+        middles = [(s.left_mm + s.right_mm) / 2 for s in cell.slices]
+        fill = fill.take(np.searchsorted(planes[k], middles) - 1, k)
+        planes[k] = np.array([cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)])
+        shares.append(np.array(cell.shares))
+    x, y, z = planes
+    return Raster((x, y, z), fill, np.outer(shares[0], shares[1]))
+
+
+def _planes(pieces: Sequence[Piece], axis: str, outer_mm: Sequence[float]) -> Real:
+    """Ends of some pieces along an axis, and further planes, those that rounding parted as one [mm]."""
+    edges = np.unique(np.array([*outer_mm, *(x for p in pieces for x in p.span(axis))]))
+    return np.asarray(edges[np.diff(edges, prepend=-np.inf) > ROUNDING_MM])
+
+
+def _filled(pieces: Sequence[tuple[Body, Piece]], planes: Sequence[Real], number: Callable[[Body], int]) -> Whole:
+    """Number of the body in each box between planes, -1 where none is."""
     fill = np.full([len(p) - 1 for p in planes], -1)
     for body, piece in pieces:
         ends = [np.searchsorted(p, np.array(piece.span(a)) - ROUNDING_MM) for a, p in zip("xyz", planes, strict=True)]
@@ -241,18 +259,12 @@ def raster(
         if (fill[here] >= 0).any():
             raise ValueError(f"{body.name} overlaps its neighbour")
         fill[here] = number(body)
-    fill[fill < 0] = air
-    shares = []
-    for k in (0, 1):
-        # What a walk along the axis meets: one level band, named by all that stands on this place.
-        looks: dict[bytes, str] = {}
-        names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in np.moveaxis(fill, k, 0)]
-        bands = [(Band(name, "", (0.0, 0.0), (1.0, 1.0)),) for name in names]
-        walk = [Slice(a, b, band) for (a, b), band in zip(pairwise(planes[k].tolist()), bands, strict=True)]
-        cell = affordable(tuple(walk), evenly)
-        middles = [(s.left_mm + s.right_mm) / 2 for s in cell.slices]
-        fill = fill.take(np.searchsorted(planes[k], middles) - 1, k)
-        planes[k] = np.array([cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)])
-        shares.append(np.array(cell.shares))
-    x, y, z = planes
-    return Raster((x, y, z), fill, np.outer(shares[0], shares[1]))
+    return fill
+
+
+def _walk(fill: Whole, at_mm: Real, axis: int) -> tuple[Slice, ...]:
+    """Layers of boxes along an axis as slices, each of one level band, named by all that is in the layer."""
+    looks: dict[bytes, str] = {}
+    names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in np.moveaxis(fill, axis, 0)]
+    bands = [(Band(name, "", (0.0, 0.0), (1.0, 1.0)),) for name in names]
+    return tuple(Slice(a, b, band) for (a, b), band in zip(pairwise(at_mm.tolist()), bands, strict=True))

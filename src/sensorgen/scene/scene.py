@@ -4,7 +4,7 @@ Plain data without a CAD kernel. Drawing, checks, meshes, solids and models all 
 disagree about the sensor. x runs along the sensor, y across it, z up; the corner is at 0, 0, 0.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import inf, isfinite
 from typing import Any, ClassVar, Protocol, Self
@@ -128,7 +128,7 @@ class Prism:
             return area_mm2(self.outline) * max(min(self.end_mm, high_mm) - max(self.start_mm, low_mm), 0.0)
         u0 = self.outline[0][0]
         area = 0.0
-        for (ua, va), (ub, vb) in zip(self.outline, self.outline[1:] + self.outline[:1], strict=True):
+        for (ua, va), (ub, vb) in sides(self.outline):
             low, high = (min(max(v, low_mm), high_mm) for v in (va, vb))
             if low != high:
                 middle = ((low + high) / 2 - va) / (vb - va)
@@ -164,10 +164,9 @@ class Prism:
         here = PLANE[self.axis].index(axis)
         # Intervals in which the plane runs inside the outline
         points = [(p[here], p[1 - here]) for p in self.outline]
-        edges = zip(points, points[1:] + points[:1], strict=True)
         heights = sorted(
             a[1] if a[1] == b[1] else a[1] + (at_mm - a[0]) / (b[0] - a[0]) * (b[1] - a[1])
-            for a, b in edges
+            for a, b in sides(points)
             if (a[0] <= at_mm) != (b[0] <= at_mm)
         )
         runs = list(zip(heights[::2], heights[1::2], strict=True))
@@ -368,15 +367,14 @@ def area_mm2(outline: Iterable[Point]) -> float:
     """Signed area of an outline, positive when counter-clockwise [mm2]."""
     points = tuple(outline)
     u0, v0 = points[0]
-    turn = zip(points, points[1:] + points[:1], strict=True)
-    return sum((a[0] - u0) * (b[1] - v0) - (b[0] - u0) * (a[1] - v0) for a, b in turn) / 2.0
+    return sum((a[0] - u0) * (b[1] - v0) - (b[0] - u0) * (a[1] - v0) for a, b in sides(points)) / 2.0
 
 
 def fault(outline: Outline, area: float | None = None) -> str:
     """Why corners are no outline, of an area that their edges may curve [mm2], or ""."""
     if len(outline) < (3 if area is None else 2):
         return f"of {len(outline)} corners is open"
-    if any(a == b for a, b in zip(outline, outline[1:] + outline[:1], strict=True)):
+    if any(a == b for a, b in sides(outline)):
         return "has the same corner twice in a row"
     area = area_mm2(outline) if area is None else area
     if not isfinite(area):
@@ -399,19 +397,34 @@ def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
     >>> clipped([(0, 0), (2, 0), (2, 1), (0, 1)], 1.5)
     ((0, 0), (1.5, 0.0), (1.5, 1.0), (0, 1))
     """
-    points = [(rounded(u), rounded(v)) for u, v in outline]
-    for sign, limit in ((-1.0, 0.0), (1.0, end_mm)):
-        inside: list[Point] = []  # on the near side of a vertical line (Sutherland and Hodgman, 1974)
-        for a, b in zip(points[-1:] + points[:-1], points, strict=True):
-            a_in, b_in = sign * (a[0] - limit) <= 0, sign * (b[0] - limit) <= 0
-            if a_in != b_in:
-                share = (limit - a[0]) / (b[0] - a[0])
-                inside.append((limit, round(a[1] + share * (b[1] - a[1]), 12)))
-            inside += [b] if b_in else []
-        points = inside
+    part = between([(rounded(u), rounded(v)) for u, v in outline], 0, 0.0, end_mm)
+    points = [(u, rounded(v)) for u, v in part]
     distinct = tuple(p for k, p in enumerate(points) if p != points[k - 1])
     width = max((p[0] for p in distinct), default=0.0) - min((p[0] for p in distinct), default=0.0)
     return distinct if len(distinct) > 2 and width > SLIVER_MM else ()
+
+
+def between(
+    corners: Sequence[tuple[float, ...]], axis: int, low_mm: float, high_mm: float
+) -> Sequence[tuple[float, ...]]:  # fmt: skip
+    """Part of a flat polygon between two values of a coordinate, by its number (Sutherland and Hodgman, 1974)."""
+    for side, level in ((1.0, low_mm), (-1.0, high_mm)):
+        inside: list[tuple[float, ...]] = []
+        for a, b in zip([*corners[-1:], *corners[:-1]], corners, strict=True):
+            if (side * (a[axis] - level) >= 0) != (side * (b[axis] - level) >= 0):
+                share = (level - a[axis]) / (b[axis] - a[axis])
+                place = [p + share * (q - p) for p, q in zip(a, b, strict=True)]
+                place[axis] = level
+                inside.append(tuple(place))
+            if side * (b[axis] - level) >= 0:
+                inside.append(b)
+        corners = inside
+    return corners
+
+
+def sides(points: Sequence[Point]) -> Iterator[tuple[Point, Point]]:
+    """Edges of an outline, from each corner to the next one."""
+    return zip(points, [*points[1:], *points[:1]], strict=True)
 
 
 def without_straight(loop: Sequence[Point]) -> Outline:

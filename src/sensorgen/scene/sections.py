@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
-from sensorgen.scene.scene import Body, Outline, Point, Scene, shadow
+from sensorgen.scene.scene import Body, Outline, Point, Scene, shadow, sides
 
 ROUNDING_MM = 1e-9  # edges nearer than this are one edge, reached by different sums
 
@@ -129,7 +129,7 @@ def _columns(section: Section) -> list[SectionColumn]:
     cuts = sorted({u for _, outline in section.regions for u, _ in outline})
     edges: list[list[tuple[Point, int]]] = [[] for _ in cuts[1:]]
     for number, (_, outline) in enumerate(section.regions):
-        for a, b in zip(outline, outline[1:] + outline[:1], strict=True):
+        for a, b in sides(outline):
             (ua, va), (ub, vb) = sorted((a, b))
             for k in range(bisect_left(cuts, ua), bisect_left(cuts, ub)):
                 slope = (vb - va) / (ub - ua)

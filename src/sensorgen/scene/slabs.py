@@ -7,7 +7,7 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from sensorgen.scene.scene import SLIVER_MM, Body, Piece, Prism, Scene, area_mm2, seen_from_above, shadow
+from sensorgen.scene.scene import SLIVER_MM, Body, Piece, Prism, Scene, area_mm2, between, seen_from_above, shadow
 
 if TYPE_CHECKING:  # a stored answer loads no numbers
     import shapely
@@ -117,10 +117,8 @@ def _projected(faces: "Real", low_mm: float, high_mm: float) -> "Iterator[shapel
     """The parts of triangles between two heights, seen from above."""
     import shapely
 
-    from sensorgen.scene.polyhedra import between
-
     for triangle in faces.tolist():
-        corners = between(triangle, low_mm, high_mm)
+        corners = between(triangle, 2, low_mm, high_mm)
         if len(corners) > 2:
             outline = shapely.Polygon([corner[:2] for corner in corners])
             if outline.area > SLIVER_MM**2:

@@ -72,11 +72,6 @@ Work = Callable[[], ModelAnswer]
 Runner = Callable[[Work], TimedAnswer]
 
 
-def here(work: Work) -> TimedAnswer:
-    """Run a piece of work in this process; raises what it raises."""
-    return _measured(work, used_s(), time.time())
-
-
 def apart(work: Work) -> TimedAnswer:
     """Run a piece of work in a process of its own.
 
@@ -107,7 +102,7 @@ def apart(work: Work) -> TimedAnswer:
     return reply
 
 
-def _measured(work: Work, before_s: float, started: float) -> TimedAnswer:
+def measured(work: Work, before_s: float, started: float) -> TimedAnswer:
     """An answer with its costs; the first one from when ``before_s`` were used and the clock stood at ``started``."""
     answer = work()
     cold = Cost(used_s() - before_s, time.time() - started)
@@ -148,7 +143,7 @@ def answer_input() -> None:
     started, packed = pickle.loads(sys.stdin.buffer.read())  # noqa: S301 - of our own process
     reply: TimedAnswer | str
     try:
-        reply = _measured(pickle.loads(packed), 0.0, started)  # noqa: S301
+        reply = measured(pickle.loads(packed), 0.0, started)  # noqa: S301
     except SensorgenError as error:
         reply = str(error)
     with io.FileIO(target, "wb") as file:

@@ -5,6 +5,7 @@ from decimal import Decimal, localcontext
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import OutOfRange
@@ -43,6 +44,17 @@ def impedance(name: str, given: PressedLine, **fineness: Any) -> Complex:
         "scikit-rf": programs.scikit_rf, "ngspice": programs.ngspice,
     }  # fmt: skip
     return works[name](given, **fineness)
+
+
+def differences(impedance: ArrayLike, known: ArrayLike) -> tuple[float, float]:
+    """Largest relative difference from known impedances, of the whole and of the real part by itself [-].
+
+    >>> differences([3 + 4j], [3 + 3.9j])[1]
+    0.0
+    """
+    pairs = ((part(np.asarray(impedance)), part(np.asarray(known))) for part in (np.asarray, np.real))
+    whole, real = (float(np.max(abs(ours - theirs) / abs(theirs))) for ours, theirs in pairs)
+    return whole, real
 
 
 def _stack(given: PressedLine) -> Complex:

@@ -6,10 +6,10 @@ Numbers only; nothing here knows of paper.
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise, permutations
+from itertools import chain, pairwise, permutations
 from math import hypot
 
-from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Point, Scene, area_mm2, clipped
+from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Point, Scene, area_mm2, clipped, sides
 from sensorgen.scene.sections import Section, SectionColumn, alike, columns
 
 PLACES = 8  # places tried for a section: two periods of crossed strips change eight times
@@ -156,21 +156,27 @@ class Gap:
 
 def heights(views: Sequence[View], height_mm: float) -> list[list[Measure]]:
     """Vertical measures in lanes from the sensor outwards: level by level, whole bodies, the whole."""
+    spans = [span for view in views for span in _extents(view)]
     levels = _distinct([0.0, height_mm, *(z for view in views for z in _levels(view))])
     if len(levels) > MOST_LEVELS:
-        levels = _distinct([0.0, height_mm, *(z for view in views for span in _extents(view) for z in span)])
-    chain = [Measure(low, high) for low, high in pairwise(levels[:MOST_LEVELS])]
+        levels = _distinct([0.0, height_mm, *chain.from_iterable(spans)])
+    steps = [Measure(low, high) for low, high in pairwise(levels[:MOST_LEVELS])]
     whole = Measure(0.0, height_mm)
-    bodies = _new((Measure(*span) for view in views for span in _extents(view)), [*chain, whole])
-    bodies = sorted(sorted(bodies, key=lambda m: m.value_mm)[:MOST_EXTENTS], key=lambda m: m.low_mm)
-    lanes: list[list[Measure]] = []  # side by side, those that overlap in different ones
-    for m in bodies:
+    bodies = _new((Measure(*span) for span in spans), [*steps, whole])
+    lanes = _lanes(sorted(bodies, key=lambda m: m.value_mm)[:MOST_EXTENTS])
+    return [*([steps] if len(steps) > 1 else []), *lanes, [whole]]
+
+
+def _lanes(measures: Iterable[Measure]) -> list[list[Measure]]:
+    """Measures side by side, those that overlap in different lanes."""
+    lanes: list[list[Measure]] = []
+    for m in sorted(measures, key=lambda m: m.low_mm):
         free = next((lane for lane in lanes if lane[-1].high_mm <= m.low_mm + SAME_MM), None)
         if free is None:
             lanes.append([m])
         else:
             free.append(m)
-    return [lane for lane in (chain, *lanes, [whole]) if lane and (lane != chain or len(chain) > 1)]
+    return lanes
 
 
 def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
@@ -181,14 +187,14 @@ def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
     lowest = [_reach(view, u, min) for u in edges]
     above = bool(edges) and min(lowest) > middle
     reach = [_reach(view, u, max) for u in edges] if above else lowest
-    chain = [Measure(a, b, ends) for (a, b), ends in zip(pairwise(edges), pairwise(reach), strict=True)]
-    chain = chain if 1 < len(chain) <= MOST_COLUMNS else []
+    steps = [Measure(a, b, ends) for (a, b), ends in zip(pairwise(edges), pairwise(reach), strict=True)]
+    steps = steps if 1 < len(steps) <= MOST_COLUMNS else []
     repeats = view.period_mm and len(edges) == len(view.period_mm)  # the view shows all of a period
     whole = [Measure(edges[0], edges[-1], (reach[0], reach[-1]))] if repeats else []
-    known = [*chain, *whole, Measure(0.0, view.end_mm)]
+    known = [*steps, *whole, Measure(0.0, view.end_mm)]
     pieces = _new(_flats(view), known, by_value=True)[:MOST_PIECES]
     rows: tuple[list[list[Measure]], list[list[Measure]]] = ([], [])
-    rows[not above].append(chain)
+    rows[not above].append(steps)
     for measure in pieces:
         rows[measure.ends_mm[0] <= middle].append([measure])
     rows[not above].append(whole)
@@ -197,8 +203,8 @@ def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
 
 def _flats(view: View) -> list[Measure]:
     """Level edges that the view's ends do not cut, from left to right."""
-    sides = (side for _, outline in view.regions for side in _sides(outline))
-    flats = sorted((min(a[0], b[0]), max(a[0], b[0]), a[1]) for a, b in sides if a[1] == b[1])
+    edges = (edge for _, outline in view.regions for edge in sides(outline))
+    flats = sorted((min(a[0], b[0]), max(a[0], b[0]), a[1]) for a, b in edges if a[1] == b[1])
     return [Measure(low, high, (z, z)) for low, high, z in flats if low > SAME_MM and high < view.end_mm - SAME_MM]
 
 
@@ -216,8 +222,8 @@ def nearest(view: View) -> Gap | None:
             terminals.setdefault(body.terminal, []).append(outline)
     gaps = []
     for corners, others in permutations(terminals.values(), 2):
-        edges = [edge for outline in others for edge in _sides(outline)]
-        for a, b in (side for outline in corners for side in _sides(outline)):
+        edges = [edge for outline in others for edge in sides(outline)]
+        for a, b in (side for outline in corners for side in sides(outline)):
             between = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
             for place, at_corner in ((a, True), (between, False)):
                 gaps += [Gap(place, _foot(place, *edge), at_corner) for edge in edges]
@@ -263,10 +269,6 @@ def _distinct(values: Iterable[float]) -> list[float]:
         if not distinct or value - distinct[-1] > SAME_MM:
             distinct.append(value)
     return distinct
-
-
-def _sides(outline: Outline) -> Iterator[tuple[Point, Point]]:
-    return zip(outline, outline[1:] + outline[:1], strict=True)
 
 
 def _foot(p: Point, a: Point, b: Point) -> Point:

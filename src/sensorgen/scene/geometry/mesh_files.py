@@ -106,7 +106,6 @@ def read_stl(path: Path, unit: str) -> list[FileBody]:
         rows = np.frombuffer(data, np.dtype([("face", "<f4", (4, 3)), ("more", "<u2")]), count, 84)
         singles = rows["face"][:, 1:].reshape(-1, 3)
         solids = [(path.stem, _shortest(singles))]
-        rounding = 2.0**-23 * float(np.abs(singles).max(initial=0.0))
     elif data.lstrip()[:5].lower() == b"solid":
         texts = re.split(rb"(?m)^\s*solid\b[ \t]*([^\r\n]*)", data)[1:]
         solids = [
@@ -116,7 +115,6 @@ def read_stl(path: Path, unit: str) -> list[FileBody]:
             )
             for name, text in zip(texts[::2], texts[1::2], strict=True)
         ]
-        rounding = 2.0**-23 * max((float(np.abs(p).max(initial=0.0)) for _, p in solids), default=0.0)
     else:
         raise BadInput(
             f"{path}: no STL: {len(data)} bytes do not fit the {count} triangles of its head; export it again"
@@ -125,8 +123,9 @@ def read_stl(path: Path, unit: str) -> list[FileBody]:
     if not solids or any(len(points) % 3 for _, points in solids):
         raise BadInput(f"{path}: an STL without whole triangles; expected a closed surface")
     _refuse_many(path, sum(len(points) // 3 for _, points in solids))
+    rounding = 2.0**-21 * scale * max(float(np.abs(points).max()) for _, points in solids)
     return [
-        FileBody(name, points * scale, np.arange(len(points)).reshape(-1, 3), rounding_mm=4 * rounding * scale)
+        FileBody(name, points * scale, np.arange(len(points)).reshape(-1, 3), rounding_mm=rounding)
         for name, points in solids
     ]
 

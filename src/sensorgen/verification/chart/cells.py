@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,12 +14,11 @@ from sensorgen.models import capacitance_models, thesis_cells
 from sensorgen.verification import peers
 from sensorgen.verification.chart import exact
 from sensorgen.verification.chart.exact import KnownCapacitance
-from sensorgen.verification.chart.measured import ChartPoint, timed
+from sensorgen.verification.chart.measured import ChartPoint, Level, climb
 
 ASKED = "the capacitance of a cell at rest"
 _LEAST_WIDTH = 1e-9  # that is asked of a model
 _NO_PEERS = ("plate, 0.6 mm",)  # exact by all of them
-_DEARER = 10.0  # by how much the next accuracy may cost more than the last
 
 
 def _designed(shape: str, dielectric_mm: float, capacitance_f_per_m2: float, known_to: float) -> KnownCapacitance:
@@ -56,24 +54,14 @@ def points(name: str, budget_s: float) -> list[ChartPoint]:
     """
     standard = STANDARD[name]()
     area, measured = standard.scene.size_mm[0] * standard.scene.size_mm[1] * M_PER_MM**2, []
-    for formula, law in thesis_cells.NAMED.items():
-        if standard.shape in law.shapes:
-            value, seconds = timed(partial(law.value_f_per_m2, standard.params, standard.permittivity["x60"]))
-            label = f"thesis_cells: {formula.removeprefix('thesis-')}"
-            measured.append(point(name, label, Interval(value, value), standard, seconds, bounded=False))
     for model, module in capacitance_models().items():
         if not module.why_not_applicable(standard.scene):
-            given = (standard.scene, standard.permittivity)
-            for wanted, interval, seconds in _rungs(module.capacitance, given, module, budget_s):
-                measured.append(point(name, model, interval.times(1 / area), standard, seconds, wanted=wanted))
-    for peer in () if name in _NO_PEERS else peers.FIELD:
-        with suppress(ValueError):  # the scene is not for it
-            for level, work in () if peers.missing(peer) else peers.levels(peer, standard.scene, standard.permittivity):
-                value, seconds = timed(work)
-                one = point(name, peer, Interval(value / area, value / area), standard, seconds, bounded=False)
-                measured.append(replace(one, result=f"{level}{one.result}"))
-                if seconds * _DEARER > budget_s:
-                    break
+            for wanted, bounds, seconds in climb(_widths(module, standard), budget_s):
+                measured.append(point(name, model, bounds.times(1 / area), standard, seconds, wanted=wanted))
+    for model, levels, per in _unbounded(name, standard, area):
+        for level, value, seconds in climb(levels, budget_s):
+            one = Interval(value / per, value / per)
+            measured.append(point(name, model, one, standard, seconds, bounded=False, level=level))
     return measured
 
 
@@ -85,38 +73,50 @@ def why_not_applicable(name: str) -> dict[str, str]:
     return {model: why for model, why in reasons.items() if why} | {"thesis_cells": only}
 
 
-def _rungs(
-    work: Callable[..., Interval], given: tuple[Any, ...], module: Any, budget_s: float
-) -> Iterator[tuple[float | None, Interval, float]]:
-    """Width that was asked for, bounds and seconds; each time for a decade less than was reached."""
+def _unbounded(name: str, standard: KnownCapacitance, area_m2: float) -> Iterator[tuple[str, list[Level], float]]:
+    """Formulas of the thesis, then programs of others; their levels, and the area that they give a value for [m2]."""
+    for formula, law in thesis_cells.NAMED.items():
+        if standard.shape in law.shapes:
+            work = partial(law.value_f_per_m2, standard.params, standard.permittivity["x60"])
+            yield f"thesis_cells: {formula.removeprefix('thesis-')}", [("", work)], 1.0
+    for peer in () if name in _NO_PEERS else peers.FIELD:
+        yield peer, peers.applicable(peer, standard.scene, standard.permittivity)[0], area_m2
+
+
+def _widths(module: Any, standard: KnownCapacitance) -> Iterator[tuple[float | None, Callable[[], Interval | None]]]:
+    """Widths to ask a model for, each a decade less than was reached, and the work that gives bounds [F]."""
+    given, reached = (standard.scene, standard.permittivity), dict[float, float]()
     if math.inf == module.WIDTH:
-        yield (None, *timed(lambda: work(*given)))
+        yield None, partial(module.capacitance, *given)
         return
+
+    def bounds(wanted: float, last: float) -> Interval | None:
+        with suppress(SensorgenError):  # doubles end here, or this order fails
+            interval: Interval = module.capacitance(*given, wanted)
+            reached[wanted] = interval.width()
+            return interval if interval.width() < last else None
+        return None
+
     wanted, last = 0.1, math.inf
     while wanted >= _LEAST_WIDTH * (1 - 1e-6):
-        asked = wanted
-        try:
-            interval, seconds = timed(lambda asked=asked: work(*given, asked))  # type: ignore[misc]
-        except SensorgenError:  # doubles end here, or this order fails
-            if last < math.inf:
+        yield wanted, partial(bounds, wanted, last)
+        if wanted in reached:
+            last = reached[wanted]
+            if last > wanted or last == 0:
                 return
+            wanted = 10.0 ** (math.ceil(math.log10(last)) - 1)
+        elif reached:
+            return
+        else:
             wanted /= 10
-            continue
-        width = interval.width()
-        if width >= last:
-            return
-        yield asked, interval, seconds
-        if width > asked or seconds * _DEARER > budget_s or width == 0:
-            return
-        wanted, last = 10.0 ** math.ceil(math.log10(width) - 1), width
 
 
 def point(
     scene: str, model: str, bounds: Interval, standard: KnownCapacitance, seconds: float, *,
-    wanted: float | None = None, bounded: bool = True,
+    wanted: float | None = None, bounded: bool = True, level: str = "",
 ) -> ChartPoint:  # fmt: skip
     """Answer of a model per area, compared with the reference."""
     off = [abs(bound / standard.capacitance_f_per_m2 - 1) for bound in (bounds.lower, bounds.upper)]
     error = max(*off, standard.known_to)
     words = f"{bounds.lower:.9g} to {bounds.upper:.9g} F/m²" if bounded else f"{bounds.lower:.9g} F/m²"
-    return ChartPoint(scene, model, error, seconds, words, bounded, wanted, bounds.lower, bounds.upper)
+    return ChartPoint(scene, model, error, seconds, level + words, bounded, wanted, bounds.lower, bounds.upper)

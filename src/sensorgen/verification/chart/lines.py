@@ -100,8 +100,7 @@ def points(name: str, budget_s: float) -> list[ChartPoint]:
     known = np.array(list(standard.known.values()))
 
     def judge(impedance: Any) -> tuple[float, str]:
-        whole = float(np.max(abs(impedance - known) / abs(known)))
-        real = float(np.max(abs(impedance.real - known.real) / abs(known.real)))
+        whole, real = line_models.differences(impedance, known)
         return max(whole, real, DIGITS), f"abs(Z) off by {whole:.2g}, Re Z by {real:.2g}"
 
     levels: dict[str, list[dict[str, Any]]] = dict(line_models.LEVELS)

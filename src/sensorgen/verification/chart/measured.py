@@ -79,31 +79,33 @@ def timed(work: Callable[[], Any]) -> tuple[Any, float]:
     return result, sorted(taken)[(len(taken) - 1) // 2]
 
 
-def climbed(scene: str, ladders: Iterable[Ladder], judge: Judge, budget_s: float) -> Iterator[ChartPoint]:
-    """Points of models, each from coarse to fine until the next level would take too long.
+def climb(levels: Iterable[tuple[Any, Callable[[], Any]]], budget_s: float) -> Iterator[tuple[Any, Any, float]]:
+    """Label, value and seconds of each level of a model, until the next one would take too long.
 
     Parameters
     ----------
-    scene : str
-        Its name.
-    ladders : iterable of Ladder
-        Models and their levels; one that raises OutOfRange ends its ladder.
-    judge : Judge
-        Compares a value with the reference.
+    levels : iterable of (label, callable)
+        From coarse to fine; the first that raises OutOfRange ends them, one that gives None is left out.
     budget_s : float
         A finer level is not tried where that would take longer, estimated as ten times the last one [s].
     """
+    for level, work in levels:
+        try:
+            value, seconds = timed(work)
+        except OutOfRange:
+            return
+        if value is not None:
+            yield level, value, seconds
+        if _DEARER * seconds > budget_s:
+            return
+
+
+def climbed(scene: str, ladders: Iterable[Ladder], judge: Judge, budget_s: float) -> Iterator[ChartPoint]:
+    """Points of models on a scene, each from coarse to fine as in :func:`climb`, compared with its reference."""
     for model, levels in ladders:
-        for level, work in levels:
-            try:
-                value, seconds = timed(work)
-            except OutOfRange:
-                break
-            if value is not None:
-                error, words = judge(value)
-                yield ChartPoint(scene, model, error, seconds, level + words)
-            if _DEARER * seconds > budget_s:
-                break
+        for level, value, seconds in climb(levels, budget_s):
+            error, words = judge(value)
+            yield ChartPoint(scene, model, error, seconds, level + words)
 
 
 def relative(known: ArrayLike, known_to: float, words: str = "off by {:+.3g} at most") -> Judge:

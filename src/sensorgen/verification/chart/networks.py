@@ -16,6 +16,7 @@ from sensorgen.models import conduction, line, sheet, stack, traxels
 from sensorgen.models.sheet import Sheet
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.network import StraightLines
+from sensorgen.verification import line_models
 from sensorgen.verification.chart.measured import DIGITS, ChartPoint, Level, climbed
 from sensorgen.verification.chart.rectilinear import plate
 
@@ -135,8 +136,7 @@ def points(name: str, budget_s: float) -> list[ChartPoint]:
     standard = STANDARD[name]()
 
     def judge(values: Values) -> tuple[float, str]:
-        pairs = [(part(values), part(standard.known)) for part in (np.asarray, np.real)]
-        off = max(float(np.max(abs(ours - known) / abs(known))) for ours, known in pairs)
+        off = max(line_models.differences(values, standard.known))
         return max(off, standard.known_to), f"off by {off:.3g} at most"
 
     return list(climbed(name, standard.models.items(), judge, budget_s))

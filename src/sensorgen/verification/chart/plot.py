@@ -44,20 +44,21 @@ def figures(points: Sequence[ChartPoint]) -> Iterator[Figure]:
     """A figure per scene."""
     for number, scene in enumerate(dict.fromkeys(p.scene for p in points)):
         here = [p for p in points if p.scene == scene]
-        curves = [
-            curve for model, k in looks(scene, points).items() if (mine := [p for p in here if p.model == model])
-            for curve in marks(
-                model, [p.seconds for p in mine], [p.error for p in mine], [f"{p.model}: {p.result}" for p in mine],
-                k, hollow=not mine[0].bounded,
-            )
-        ]  # fmt: skip
+        curves = [curve for model, k in looks(scene, points).items() for curve in _of_model(model, here, k)]
         front = list(steps([p for p in here if p.front]))
-        curves.append(
-            Curve("line", "Pareto front", [x for x, _ in front], [y for _, y in front], colour=GREY, dash="dash")
-        )
+        ends = [x for x, _ in front], [y for _, y in front]
+        curves.append(Curve("line", "Pareto front", *ends, colour=GREY, dash="dash"))
         errors, asked = [p.error for p in here], f"relative error of {kind_of(scene).ASKED}"
         drawn = panel(curves, "processor time [s]", asked, (min(errors), max(errors)), scene)
         yield Figure(f"scene-{number}", scene, f"R{asked[1:]}; each point names its model and result.", {"": (drawn,)})
+
+
+def _of_model(model: str, points: Sequence[ChartPoint], k: int) -> Iterator[Curve]:
+    """Marks of one model among the points of a scene; none where it is silent there."""
+    if mine := [p for p in points if p.model == model]:
+        text = [f"{p.model}: {p.result}" for p in mine]
+        hollow = not mine[0].bounded
+        yield from marks(model, [p.seconds for p in mine], [p.error for p in mine], text, k, hollow=hollow)
 
 
 def marks(

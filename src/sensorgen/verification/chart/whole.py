@@ -73,10 +73,8 @@ def nothing_stored() -> Iterator[None]:
         try:
             yield
         finally:
-            if before is None:
-                del os.environ[cache.PLACE]
-            else:
-                os.environ[cache.PLACE] = before
+            del os.environ[cache.PLACE]
+            os.environ |= {} if before is None else {cache.PLACE: before}
 
 
 def why_not_applicable(name: str) -> dict[str, str]:  # noqa: ARG001

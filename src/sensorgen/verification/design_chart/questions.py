@@ -1,6 +1,6 @@
 """Quantities of a design: models and other programs that give them, and their references."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
@@ -10,8 +10,9 @@ import numpy as np
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design.body import Body
+from sensorgen.design.design import Design
 from sensorgen.design.values import film, permittivities
-from sensorgen.models import capacitance_models, thesis_cells
+from sensorgen.models import CapacitanceModel, capacitance_models, thesis_cells
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import mesh_ladder, planning
@@ -20,6 +21,7 @@ from sensorgen.prediction.compression_law import CLOSED_FORM, elastic, law_of
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import piece
+from sensorgen.scene.scene import Scene
 from sensorgen.solvers.line.inputs import PressedLine, read
 from sensorgen.verification import line_models, peers
 from sensorgen.verification.apart import Work
@@ -30,6 +32,8 @@ WIDTHS, WIDTHS_IN_3D = (1e-3, 1e-5, 1e-7), (1e-1, 1e-2, 1e-3, 1e-4)  # of the bo
 ACCURACIES = (1e-1, 1e-2, 1e-3)
 DIGITS = 2.0**-52
 _SPATIAL = 3  # cost of a field solve in space
+
+Level = tuple[str, Work, float]
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ class Series:
 
     model: str
     program: str
-    levels: tuple[tuple[str, Work, float], ...]
+    levels: tuple[Level, ...]
 
 
 @dataclass(frozen=True)
@@ -119,26 +123,11 @@ def _capacitance(body: Body) -> Question:
     for name, module in capacitance_models().items():
         if why := module.why_not_applicable(scene):
             silent.append((name, why))
-            continue
-        widths = (None,) if inf == module.WIDTH else WIDTHS if module.COST < _SPATIAL else WIDTHS_IN_3D
-        levels = tuple(
-            (f"width {w:g}" if w else "", partial(works.capacitance, name, scene, eps, w, count),
-             (expected(name, scene, w)[1] or 0.0) if w else 0.0)
-            for w in widths
-        )  # fmt: skip
-        series.append(Series(name, OWN, levels))
-    params = body.design.params
-    area_m2 = params.length_mm * params.width_mm * M_PER_MM**2
-    for name, law in thesis_cells.NAMED.items():
-        if body.design.shape in law.shapes:
-            work = partial(works.formula, name, params, eps[film(body.design)], area_m2)
-            series.append(Series(f"thesis_cells: {name.removeprefix('thesis-')}", OWN, (("", work, 0.0),)))
+        else:
+            series.append(Series(name, OWN, tuple(_bounds(name, module, scene, eps, count))))
+    series += _formulas(body.design, eps)
     for name in peers.FIELD:
-        try:
-            runs = [] if peers.missing(name) else peers.levels(name, scene, eps)
-            why = peers.missing(name)
-        except ValueError as error:
-            runs, why = [], str(error)
+        runs, why = peers.applicable(name, scene, eps)
         if why:
             silent.append((name, why))
             continue
@@ -148,6 +137,25 @@ def _capacitance(body: Body) -> Question:
         )
         series.append(Series(name, name, levels))
     return Question("capacitance", "capacitance at rest", "C at rest", tuple(series), tuple(silent), (), largest)
+
+
+def _bounds(
+    name: str, module: CapacitanceModel, scene: Scene, permittivity: Mapping[str, float], count: float
+) -> Iterator[Level]:  # fmt: skip
+    """Levels of one of our models by the width of its bounds; one alone where none can be asked for."""
+    widths = (None,) if inf == module.WIDTH else WIDTHS if module.COST < _SPATIAL else WIDTHS_IN_3D
+    for w in widths:
+        work = partial(works.capacitance, name, scene, permittivity, w, count)
+        yield (f"width {w:g}", work, expected(name, scene, w)[1] or 0.0) if w else ("", work, 0.0)
+
+
+def _formulas(design: Design, permittivity: Mapping[str, float]) -> Iterator[Series]:
+    """Formulas of the thesis for the shape of a design."""
+    area_m2 = design.params.length_mm * design.params.width_mm * M_PER_MM**2
+    for name, law in thesis_cells.NAMED.items():
+        if design.shape in law.shapes:
+            work = partial(works.formula, name, design.params, permittivity[film(design)], area_m2)
+            yield Series(f"thesis_cells: {name.removeprefix('thesis-')}", OWN, (("", work, 0.0),))
 
 
 def _compression(body: Body, stress_pa: float) -> Question:
@@ -190,15 +198,14 @@ def _published(body: Body, case: mesh_ladder.Case, stress_pa: float) -> tuple[Re
     """Published answers of two other programs for this very cell under this pressure, if there are any."""
     from sensorgen.verification.chart import presses
 
-    for known in presses.CELLS.values():
-        drawn = {k: v for k, v in vars(known.params()).items() if k not in ("length_mm", "width_mm")}
-        same = body.design.shape == "tri" and drawn.items() <= vars(body.design.params).items()
-        soft = all(
-            name in presses.SOLIDS and np.isclose(solid.youngs_modulus_pa, presses.SOLIDS[name].youngs_modulus_pa)
-            for name, solid in case.solids.items()
-        )
-        at = [k for k, kpa in enumerate(known.stress_kpa) if np.isclose(kpa * 1e3, stress_pa)]
-        if body.is_drawn and same and soft and at:
+    soft = all(
+        name in presses.SOLIDS and np.isclose(solid.youngs_modulus_pa, presses.SOLIDS[name].youngs_modulus_pa)
+        for name, solid in case.solids.items()
+    )
+    for known in presses.CELLS.values() if soft and body.is_drawn and body.design.shape == "tri" else ():
+        at = np.flatnonzero(np.isclose(np.array(known.stress_kpa) * 1e3, stress_pa))
+        size = {name: getattr(body.design.params, name) for name in ("length_mm", "width_mm")}
+        if len(at) and replace(known.params(), **size) == body.design.params:
             rise = known.rise_pf_per_m[at[0]] / known.rest_pf_per_m
             return (Reference("two other programs", "published", (rise,), known.known_to[1]),)
     return ()
@@ -255,18 +262,12 @@ def _line(sensor: Sensor, query: Query, body: Body) -> Question:
 
 
 def _prediction(body: Body, query: Query) -> Question:
-    series: list[Series] = []
-    ways: list[tuple[str, str, Query, bool]] = [
-        ("closed forms", "", query, True), ("plate, free", "", replace(query, law="unconfined"), False),
-        ("default", "", query, False),
-        *(("accuracy", f"{a:g}", replace(query, accuracy=a), False) for a in ACCURACIES),
-    ]  # fmt: skip
-    for name in dict.fromkeys(way[0] for way in ways):
-        levels = []
-        for _, level, asked, rough in (way for way in ways if way[0] == name):
-            work = partial(works.predicted, body, asked, rough=rough)
-            levels.append((level, work, 0.0 if rough else _seconds(body, asked)))
-        series.append(Series(f"predict: {name}", OWN, tuple(levels)))
+    free, fine = replace(query, law="unconfined"), [(f"{a:g}", replace(query, accuracy=a)) for a in ACCURACIES]
+    rough = ("", partial(works.predicted, body, query, rough=True), 0.0)
+    series = [Series("predict: closed forms", OWN, (rough,))]
+    for name, levels in (("plate, free", [("", free)]), ("default", [("", query)]), ("accuracy", fine)):
+        runs = [(level, partial(works.predicted, body, asked), _seconds(body, asked)) for level, asked in levels]
+        series.append(Series(f"predict: {name}", OWN, tuple(runs)))
     return Question("prediction", "whole prediction", "|Z| under the load", tuple(series), (), (), of_modulus)
 
 
@@ -284,8 +285,7 @@ def largest(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
 
 def of_line(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
     """The larger one of abs(Z) and of Re Z by itself, at the worst frequency [-]."""
-    real = (abs(a.real / b.real - 1) for a, b in zip(answer, known, strict=True))
-    return max(largest(answer, known), *real)
+    return max(line_models.differences(answer, known))
 
 
 def of_modulus(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:

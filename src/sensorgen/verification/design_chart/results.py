@@ -29,6 +29,7 @@ from sensorgen.verification.design_chart.questions import (
 KEYS = ("capacitance", "compression", "line", "prediction")
 _LEAST = 2  # levels of another program, whose difference is its doubt: without it there is no reference
 _DEARER = 5.0  # how many times longer the next level should take than the last one
+Run = tuple[Series, str, TimedAnswer]  # a model, its level in words, and the answer
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,10 @@ class Point:
     certified: bool
     contradicted: bool
 
+    def words(self) -> str:
+        """Model and level."""
+        return f"{self.model} {self.level}".rstrip()
+
 
 @dataclass(frozen=True)
 class Silent:
@@ -126,27 +131,29 @@ class DesignChart(Displayed):
         """The table of one question."""
         here = [p for p in self.points if p.question == key]
         yield Table.of(key, f"{self.titles[key]}: relative error; time of the processor", here)
-        for words in dict.fromkeys(p.against for p in here):
-            of = [p for p in here if p.against == words]
-            own = "" if of[0].independent else ", which is not independent"
-            yield f"against {words}{own}, known to {of[0].doubt:.2g}: {', '.join(dict.fromkeys(p.model for p in of))}"
-        yield from (
-            f"error larger than stated: {p.model} {p.level}".rstrip()
-            for p in here if p.contradicted
-        )  # fmt: skip
-        if silent := [s for s in self.silent if s.question == key]:
-            yield Facts(tuple((s.model, s.why) for s in silent))
+        yield from _against(here)
+        yield from (f"error larger than stated: {p.words()}" for p in here if p.contradicted)
+        if silent := [(s.model, s.why) for s in self.silent if s.question == key]:
+            yield Facts(tuple(silent))
 
     def problems(self) -> Sequence[str]:
         """Models whose error is larger than they state."""
         wrong = [p for p in self.points if p.contradicted]
-        return [f"{p.model} {p.level}".rstrip() + f": error {p.error:.2g}, {p.stated:.2g} stated" for p in wrong]
+        return [f"{p.words()}: error {p.error:.2g}, {p.stated:.2g} stated" for p in wrong]
 
     def csv(self) -> Iterator[str]:
         """All points in one table."""
         from sensorgen.core.document import comma_separated
 
         yield comma_separated(Table.of("chart", "", self.points))
+
+
+def _against(points: Sequence[Point]) -> Iterator[str]:
+    """References of a question in words, each with the models that are compared with it."""
+    for words in dict.fromkeys(p.against for p in points):
+        of = [p for p in points if p.against == words]
+        own = "" if of[0].independent else ", which is not independent"
+        yield f"against {words}{own}, known to {of[0].doubt:.2g}: {', '.join(dict.fromkeys(p.model for p in of))}"
 
 
 def chart(
@@ -181,21 +188,15 @@ def chart(
     silent: list[Silent] = []
     best: dict[str, list[Reference]] = {}
     for question in asked:
-        silent += [Silent(question.key, *each) for each in question.silent]
-        runs: list[tuple[Series, str, TimedAnswer]] = []
-        for series in question.series:
-            more, why = _climbed(series, budget_s, partial(step, f"{question.key}: {series.model}"), runner)
-            runs += more
-            silent += [Silent(question.key, series.model, why)] if why else []
-        known = list(question.references)
-        if question.key == "prediction":
-            known += composed(body, query, best)
-        best[question.key] = known + list(_from(runs)) if question.key != "prediction" else known
-        if not best[question.key]:
+        runs, without = _runs(question, budget_s, step, runner)
+        more = composed(body, query, best) if question.key == "prediction" else _from(runs)
+        known = best[question.key] = [*question.references, *more]
+        if known:
+            points += [_point(question, *run, known) for run in runs]
+        else:
             why = f"no reference within --budget {budget_s:g}"
-            silent += [Silent(question.key, series.model, why) for series in dict.fromkeys(run[0] for run in runs)]
-            continue
-        points += [_point(question, *run, best[question.key]) for run in runs]
+            without += [(model, why) for model in dict.fromkeys(series.model for series, *_ in runs)]
+        silent += [Silent(question.key, *each) for each in without]
     load = query.load(body.design)
     return DesignChart(
         body.design.name, body.provenance, load.force_n, load.position_m,
@@ -204,11 +205,21 @@ def chart(
     )  # fmt: skip
 
 
-def _climbed(
-    series: Series, budget_s: float, step: Callable[[], None], runner: Runner
-) -> tuple[list[tuple[Series, str, TimedAnswer]], str]:
+def _runs(
+    question: Question, budget_s: float, step: Callable[[str], None], runner: Runner
+) -> tuple[list[Run], list[tuple[str, str]]]:  # fmt: skip
+    """Runs of all models for a question; and why a model has none, or no more."""
+    runs, silent = list[Run](), list(question.silent)
+    for series in question.series:
+        more, why = _climbed(series, budget_s, partial(step, f"{question.key}: {series.model}"), runner)
+        runs += more
+        silent += [(series.model, why)] if why else []
+    return runs, silent
+
+
+def _climbed(series: Series, budget_s: float, step: Callable[[], None], runner: Runner) -> tuple[list[Run], str]:
     """Runs of a model from coarse to fine until the next one would take too long; and why there are no more."""
-    done: list[tuple[Series, str, TimedAnswer]] = []
+    done: list[Run] = []
     for level, work, expected_s in series.levels:
         last_s = max((run.cold.cpu_s - _started_s(done) for _, _, run in done[-1:]), default=0.0)
         likely_s = max(expected_s, _DEARER * last_s if not expected_s else 0.0)
@@ -224,12 +235,12 @@ def _climbed(
     return done, ""
 
 
-def _started_s(done: Sequence[tuple[Series, str, TimedAnswer]]) -> float:
+def _started_s(done: Sequence[Run]) -> float:
     """Start of a process and loading of libraries, at most: the least difference of cold and warm [s]."""
     return min((run.cold.cpu_s - run.warm.cpu_s for _, _, run in done), default=0.0)
 
 
-def _from(runs: Sequence[tuple[Series, str, TimedAnswer]]) -> Iterator[Reference]:
+def _from(runs: Sequence[Run]) -> Iterator[Reference]:
     """References: bounds, and the finest answer of a program with its last change as its doubt."""
     bounds = [(run.answer.stated or 0.0, series, run) for series, _, run in runs if run.answer.certified]
     if bounds:

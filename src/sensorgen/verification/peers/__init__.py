@@ -32,6 +32,16 @@ def missing(peer: str) -> str:
     return "" if find_spec(name) else f"not installed: pip install {packages.get(name, name)}"
 
 
+def applicable(peer: str, scene: Scene, permittivity: Mapping[str, float]) -> tuple[Levels, str]:
+    """Levels of a peer on a scene, as :func:`levels`; none, and why, where it is not installed or cannot take it."""
+    if why := missing(peer):
+        return [], why
+    try:
+        return levels(peer, scene, permittivity), ""
+    except ValueError as error:
+        return [], str(error)
+
+
 def levels(peer: str, scene: Scene, permittivity: Mapping[str, float]) -> Levels:
     """A peer's capacitances of a scene, from coarse to fine.
 

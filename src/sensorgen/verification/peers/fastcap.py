@@ -64,12 +64,8 @@ def capacitance(cell: cells.PlaneSection | Grid, permittivity: Mapping[str, floa
                         surfaces[key].add_quad(*moved)
                     else:
                         surfaces[key].add_quad(*moved, rp=tuple(within))
-    return _charge(surfaces, permittivity) * cells.share(cell) * _depths(cell, size)
-
-
-def _depths(cell: cells.PlaneSection | Grid, size_mm: Real) -> float:
-    """Number of cells, as deep as taken, in the sensor's depth [-]."""
-    return cell.depth_mm / float(size_mm[1]) if isinstance(cell, cells.PlaneSection) else 1.0
+    deep = cell.depth_mm / float(size[1]) if isinstance(cell, cells.PlaneSection) else 1.0
+    return _charge(surfaces, permittivity) * cells.share(cell) * deep
 
 
 def _charge(surfaces: "Mapping[tuple[str, str], object]", permittivity: Mapping[str, float]) -> float:
