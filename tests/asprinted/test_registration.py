@@ -90,7 +90,7 @@ def test_the_piece_of_a_plate_that_has_a_fault_is_named(made, tmp_path):
     alone, (x, y) = done.ready.read_text("utf-8"), design.machine.bed_centre_mm()
     places = [lambda u, v: (u, v), lambda u, v: (u - 40, v + 20), lambda u, v: (y - v + 40, u - x)]
     turns = [changed(alone, place) for place in places]
-    for broken, at in ((1, f"at x {x - 40:.4g}, y {y + 20:.4g} mm on the bed"), (2, "at x 40, y 0 mm on the bed")):
+    for broken, at in ((1, f"at x {x - 40:.4g}, y {y + 20:.4g} mm"), (2, "at x 40, y 0 mm")):
         texts = [without(text, 3) if k == broken else text for k, text in enumerate(turns)]
         motion = follow("".join(texts).encode())
         assert len(pieces(design, motion)) == 3
