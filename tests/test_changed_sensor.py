@@ -11,6 +11,7 @@ from sensorgen.prediction.calibration import calibration as records
 from sensorgen.prediction.calibration.calibration import inside
 from sensorgen.prediction.calibration.fitting import by_rest, calibrated, gain, loosened, widened
 from sensorgen.prediction.calibration.inversion import OTHERWISE, Inverter, Verdict, doubt_rest
+from sensorgen.prediction.calibration.materials import MaterialEstimate
 from sensorgen.prediction.calibration.rest import Baseline, Rest
 
 NOISE, LIMIT_N, ANSWERED = 1e-3, 7.5, (Verdict.OK, Verdict.FORCE_ONLY)
@@ -206,6 +207,15 @@ def test_a_hole_is_calibrated_and_named(model, ohm):
     made = records.Calibration("S1", "mine", "0" * 16, model, posterior, 6.0, None, ("a",))
     assert any(note.startswith("leak: ") and "has left what was expected" in note for note in made.departures())
     assert np.isfinite(posterior.covariance).all()
+
+
+@pytest.mark.parametrize(("value", "is_told"), [(3.34e6, True), (9.9e6, True), (3.7e6, False), (9.7e6, False)])
+def test_a_material_whose_median_was_not_expected_is_named(model, specimens, monkeypatch, value, is_told):
+    """Also where its interval still reaches into what was expected."""
+    modulus = MaterialEstimate("x60", "youngs_modulus_pa", value, 0.8 * value, 1.2 * value, 3.68e6, 9.79e6, "presses")
+    monkeypatch.setattr(records.Calibration, "materials", lambda _: [modulus])
+    made = records.Calibration("S1", "mine", "0" * 16, model, specimens[0][2], 6.0, None, ("a",))
+    assert [note.partition(":")[0] for note in made.departures()] == ["x60 youngs_modulus_pa"] * is_told
 
 
 @pytest.mark.parametrize(

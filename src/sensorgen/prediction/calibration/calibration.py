@@ -122,6 +122,11 @@ class CalibratedValue:
     before_upper: Annotated[float, Column("before 95 %")]
     by: Annotated[str, Column("known by", about="presses and rest: what the readings say; prediction: what was known")]
 
+    @property
+    def has_left(self) -> bool:
+        """True if no value of it was expected: medians of one in ten sound specimens lie outside."""
+        return self.lower > self.before_upper or self.upper < self.before_lower
+
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
@@ -178,7 +183,7 @@ class Calibration:
             f"{name}: {one.value:.3g} ({one.lower:.3g} to {one.upper:.3g}) has left what was expected, "
             f"{one.before_lower:.3g} to {one.before_upper:.3g}: doubt the design, film (a hole leaks), tip or bench"
             for name, one in estimates.items()
-            if one.lower > one.before_upper or one.upper < one.before_lower
+            if one.has_left
         )
 
     def source(self) -> str:

@@ -82,6 +82,11 @@ class MaterialEstimate:
         """True if the readings say more than the prediction did."""
         return self.by == _BY_READINGS
 
+    @property
+    def has_left(self) -> bool:
+        """True if its median is none of the values that were expected."""
+        return not self.before_lower <= self.value <= self.before_upper
+
     def interval(self, level: float) -> tuple[float, float]:
         """Ends of another interval of a probability [-]."""
         from scipy.special import ndtri
