@@ -124,7 +124,7 @@ class CalibratedValue:
 
     @property
     def has_left(self) -> bool:
-        """True if no value of it was expected: medians of one in ten sound specimens lie outside."""
+        """True if no value of its interval was expected."""
         return self.lower > self.before_upper or self.upper < self.before_lower
 
 
