@@ -41,3 +41,13 @@ def test_one_form_at_a_time(run, name):
     said = run(*COMMANDS[name], "--json", "--markdown")
     assert (said.code, said.out) == (2, "")
     assert "--json and --markdown at once; expected one of them" in said.line
+
+
+@pytest.mark.parametrize(
+    "words", ["build tri", "slice tri", "batch plan.yaml", "optimise tri", "import a.step", "demo lab"]
+)
+def test_o_of_a_command_that_writes_a_folder_is_that_folder(run, tmp_path, words):
+    said = run(*words.split(), "-o", "d.gcode")
+    assert said.code == 2
+    assert "--out: 'd.gcode' is the name of a file; expected a folder" in said.line
+    assert not (tmp_path / "d.gcode").exists()

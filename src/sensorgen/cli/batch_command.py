@@ -8,7 +8,7 @@ import click
 from sensorgen.cli import FOUND_ERRORS, render
 from sensorgen.cli.commands import FirstWord
 from sensorgen.cli.commands import command as of_function
-from sensorgen.cli.options import Cluster, LogFile, Strict, TimeLimit
+from sensorgen.cli.options import Cluster, LogFile, Out, Strict, TimeLimit
 from sensorgen.core.options import Option
 from sensorgen.export.slicers import TIME_LIMIT_S
 
@@ -23,16 +23,16 @@ class _PlanGroup(FirstWord):
     def of(self, name: str) -> click.Command:
         """The command for a plan."""
 
-        @of_function(name, *render.options())
+        @of_function(name, *render.options(folder=True))
         def plan(
-            *, out: Path = Path("out"), no_gcode: bool = False, time_limit_s: TimeLimit = TIME_LIMIT_S,
+            *, out: Out = Path("out"), no_gcode: bool = False, time_limit_s: TimeLimit = TIME_LIMIT_S,
             force: bool = False, strict: Strict = False, jobs: Jobs = 1, cluster: Cluster = "",
         ) -> int:  # fmt: skip
             """Write all files of a plan's plate.
 
             Parameters
             ----------
-            out : DIR
+            out
                 Folder for batches' folders.
             no_gcode
                 Leave out slicing, which takes most of the time.

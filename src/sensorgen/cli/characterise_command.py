@@ -8,7 +8,7 @@ import click
 from sensorgen.cli import render
 from sensorgen.cli.commands import FirstWord
 from sensorgen.cli.commands import command as of_function
-from sensorgen.cli.options import DryRun
+from sensorgen.cli.options import DryRun, Out
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -23,10 +23,10 @@ class _PrinterGroup(FirstWord):
     def of(self, name: str) -> click.Command:
         """The command for a printer."""
 
-        @of_function(name, *render.options())
+        @of_function(name, *render.options(folder=True))
         def printer(
             materials: tuple[str, ...], *, quality: str = "fine", tools: tuple[str, ...] = (), plate: str = "",
-            count: int = 12, hours: float = 4.0, out: Path = Path("out"),
+            count: int = 12, hours: float = 4.0, out: Out = Path("out"),
         ) -> "Documented":  # fmt: skip
             """Choose coupons and write their plate's files.
 
@@ -43,7 +43,7 @@ class _PrinterGroup(FirstWord):
                 Most coupons.
             hours
                 Longest print [h].
-            out : DIR
+            out
                 Folder of plates.
             """
             from sensorgen.workflows.characterise import STEPS, Study, plan

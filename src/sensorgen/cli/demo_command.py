@@ -8,6 +8,7 @@ import click
 
 from sensorgen.cli import render
 from sensorgen.cli.commands import command as of_function
+from sensorgen.cli.options import Out
 from sensorgen.core.options import Option
 
 command = click.Group("demo", help="Demonstrations that need no hardware.")
@@ -16,9 +17,12 @@ Seed = Annotated[int, Option(kind=click.IntRange(0))]
 
 
 @of_function(
-    "lab", *render.options("json", "markdown"), group=command, short="The whole loop on a virtual column of five."
+    "lab",
+    *render.options("json", "markdown", folder=True),
+    group=command,
+    short="The whole loop on a virtual column of five.",
 )
-def _lab(*, out: Path = Path("out/demo-lab"), count: Prints = 5, seed: Seed = 1, show_it: bool = True) -> None:
+def _lab(*, out: Out = Path("out/demo-lab"), count: Prints = 5, seed: Seed = 1, show_it: bool = True) -> None:
     """Design, print, press, calibrate, find presses again, report: on a virtual column of sensors.
 
     Each virtual print has material values of its own, drawn from their ranges; the result holds what the calibration
@@ -26,7 +30,7 @@ def _lab(*, out: Path = Path("out/demo-lab"), count: Prints = 5, seed: Seed = 1,
 
     Parameters
     ----------
-    out : DIR
+    out
         New or empty folder.
     count, --prints
         How many sensors the column has.
@@ -45,17 +49,17 @@ def _lab(*, out: Path = Path("out/demo-lab"), count: Prints = 5, seed: Seed = 1,
 
 
 @of_function(
-    "insole", *render.options("json", "markdown"), group=command,
+    "insole", *render.options("json", "markdown", folder=True), group=command,
     short="An insole, from its outline to pressure maps beside the truth.",
 )  # fmt: skip
-def _insole(*, out: Path = Path("out/demo-insole"), seed: Seed = 1, show_it: bool = True) -> None:
+def _insole(*, out: Out = Path("out/demo-insole"), seed: Seed = 1, show_it: bool = True) -> None:
     """Outline, design, check, virtual print with two faults, calibration, a step, maps beside the truth, report.
 
     A second run follows with the design changed by the report of the first.
 
     Parameters
     ----------
-    out : DIR
+    out
         New or empty folder.
     seed
         Of the first virtual print; the others follow.

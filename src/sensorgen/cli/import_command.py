@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 from sensorgen.cli import FOUND_ERRORS, render
 from sensorgen.cli.commands import command as of_function
+from sensorgen.cli.options import Out
 from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option
 
@@ -12,13 +13,13 @@ Chord = Annotated[float, Option(kind="length", typed="0.01")]
 
 
 @of_function(
-    "import", *render.options("json", "csv", "markdown"),
+    "import", *render.options(folder=True),
     about="Import bodies drawn in another CAD program as a design: STEP, 3MF, or STL with --unit. All commands take "
     "it. Exit code 1 where electrodes touch.",
 )  # fmt: skip
 def command(
     files: tuple[Path, ...], *, maps: tuple[str, ...] = (), terminals: tuple[str, ...] = (), only_list: bool = False,
-    unit: str = "", chord: Chord, name: str = "", out: Path = Path(), printer: str = "", quality: str = "",
+    unit: str = "", chord: Chord, name: str = "", out: Out = Path(), printer: str = "", quality: str = "",
     force: bool = False,
 ) -> int:  # fmt: skip
     """Read, repair or refuse, and write.
@@ -38,7 +39,7 @@ def command(
         How far triangles may lie from curved faces of a STEP.
     name
         Name of the design; that of the file if not given.
-    out : DIR
+    out
         Folder for the design file.
     printer : NAME
         A printer that is listed, or a YAML file.

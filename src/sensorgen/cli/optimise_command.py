@@ -7,15 +7,15 @@ import click
 
 from sensorgen.cli import render
 from sensorgen.cli.commands import command as of_function
-from sensorgen.cli.options import Cluster, DesignTip, Jobs, NoCache
+from sensorgen.cli.options import Cluster, DesignTip, Jobs, NoCache, Out
 from sensorgen.core.options import Option
 
 Sample = Annotated[int | None, Option(kind=click.IntRange(1, 20_000))]  # fmt: skip
 
 
-@of_function("optimise", *render.options(csv="Print every design as CSV, all digits."))
+@of_function("optimise", *render.options(csv="Print every design as CSV, all digits.", folder=True))
 def command(
-    target: str, *, out: Path = Path("out"), sample: Sample = None, tip: DesignTip = None, jobs: Jobs = None,
+    target: str, *, out: Out = Path("out"), sample: Sample = None, tip: DesignTip = None, jobs: Jobs = None,
     cluster: Cluster = "", no_cache: NoCache = False, no_build: bool = False, no_gcode: bool = False,
 ) -> int:  # fmt: skip
     """Find the designs of a space that no other is better than, as printed, and write the files of up to three.
@@ -27,7 +27,7 @@ def command(
     Parameters
     ----------
     target : {SHAPE|DESIGN.yaml|TARGET.yaml}
-    out : DIR
+    out
         Folder of all files.
     sample : N
         Try N designs that NSGA-II chooses, of a space too large to try all; nothing is then proven.

@@ -26,7 +26,7 @@ Strict = Annotated[bool, Option("Treat warnings as errors.")]
 Explain = Annotated[bool, Option("Print which models were used, and their cost and error.")]
 NoCache = Annotated[bool, Option("Solve anew, and keep nothing.")]
 DryRun = Annotated[bool, Option("Write no file.")]
-Out = Annotated[Path, Option("Folder for the designs' folders.", metavar="DIR")]
+Out = Annotated[Path, Option(flags=("--out", "-o"), kind="folder", metavar="DIR")]
 TimeLimit = Annotated[float, Option("End the slicer after this time.", ("--time-limit",), "seconds", metavar="SECONDS")]
 DesignTip = Annotated[
     dict[str, Any] | None,

@@ -74,16 +74,16 @@ def _all_tiles(design: "Design", given: dict[str, Any]) -> "Sequence[Design]":
     return [tile for _, tile in placed]
 
 
-@of_design("build", *render.options("json", "markdown", outputs=("--output",)), parts=_all_tiles)
+@of_design("build", *render.options("json", "markdown", folder=True), parts=_all_tiles)
 def build_command(
-    design: "Design", *, out: Path = Path("out"), no_cad: bool = False, force: bool = False, strict: Strict = False,
+    design: "Design", *, out: Out = Path("out"), no_cad: bool = False, force: bool = False, strict: Strict = False,
     compensate: Compensate = "", verify: bool = False, details: bool = False, advise: bool = False, advising: Advising,
 ) -> int:  # fmt: skip
     """Write everything that a design's print needs: 3MF, STEP, profiles, drawing, prediction.
 
     Parameters
     ----------
-    out, --out, -o : DIR
+    out
         Folder for the designs' folders.
     no_cad
         Skip the STEP file (saves about 3 s).
@@ -144,7 +144,7 @@ def _verify(design: "Design", folder: Path) -> int:
     return FOUND_ERRORS if differences else 0
 
 
-@of_design("slice", *render.options("json", "markdown"))
+@of_design("slice", *render.options("json", "markdown", folder=True))
 def slice_command(
     design: "Design", *, slicer: Annotated[str, Option(kind=tuple(SLICERS))] = "prusa", program: str = "",
     time_limit_s: TimeLimit = TIME_LIMIT_S, out: Out = Path("out"), force: bool = False, strict: Strict = False,
@@ -161,6 +161,8 @@ def slice_command(
         PrusaSlicer (2.5 or later), or CuraEngine (4.13 or later).
     program : PATH
         The slicer's program; the one on PATH if not given.
+    out
+        Folder for the designs' folders.
     force
         Slice even if checks of the design report errors.
     """

@@ -95,15 +95,19 @@ _FORM, _FILE = "sensorgen.form", "sensorgen.output"  # in the context's meta
 
 
 def options(
-    *forms: str, file: bool = True, csv: str = _ABOUT["csv"], outputs: tuple[str, ...] = ("--output", "-o"),
+    *forms: str, file: bool = True, csv: str = _ABOUT["csv"], folder: bool = False,
 ) -> list[click.Parameter]:  # fmt: skip
-    """``--json``, ``--csv``, ``--markdown``, or those named, and ``--output``; :func:`deliver` obeys them."""
+    """``--json``, ``--csv``, ``--markdown``, or those named, and ``--output``; :func:`deliver` obeys them.
+
+    ``-o`` is short for ``--output``, except of a command that writes a folder: there it is short for ``--out``.
+    """
     flags = [
         click.Option([f"--{form}", f"as_{form}"], is_flag=True, expose_value=False, callback=_choose, help=about)
         for form, about in (_ABOUT | {"csv": csv}).items() if form in (forms or _ABOUT)
     ]  # fmt: skip
     output = click.Option(
-        [*outputs], metavar="FILE", expose_value=False, callback=_to, help="Write this file."
+        ["--output", *(() if folder else ("-o",))], metavar="FILE", expose_value=False, callback=_to,
+        help="Write the answer to this file, and print its name.",
     )  # fmt: skip
     return [*flags, output] if file else [*flags]
 

@@ -167,9 +167,25 @@ class Png(Word):
         return Path(text)
 
 
+_ENDINGS = {".3mf", ".csv", ".gcode", ".html", ".json", ".md", ".step", ".stl", ".svg", ".txt", ".yaml", ".zip"}
+
+
+class Folder(Word):
+    """Folder that a command writes into: no name of a file."""
+
+    name = "DIR"
+
+    def read(self, text: str) -> Path:
+        """Take any name but that of a file that sensorgen writes."""
+        folder = Path(text)
+        if folder.suffix.lower() in _ENDINGS and not folder.is_dir():
+            raise BadInput(f"{text!r} is the name of a file; expected a folder, in which files are named by the design")
+        return folder
+
+
 KINDS: dict[str, Word] = {  # by the names that annotations have for them
     "length": Length(), "share": ShownShare(), "proper share": ProperShare(), "ratio": Ratio(),
-    "seconds": Ratio("seconds above 0"), "tip": TipWords(), "pad": Pad(), "png": Png(),
+    "seconds": Ratio("seconds above 0"), "tip": TipWords(), "pad": Pad(), "png": Png(), "folder": Folder(),
 }  # fmt: skip
 
 
