@@ -72,6 +72,10 @@ def test_tables_for_pandas(results):
     assert list(table.columns[:3]) == ["electrode_mm", "dielectric_mm", "capacitance [pF]"]
     assert len(table) == 4
     assert len(results["check"].to_pandas()) == len(results["check"].findings)
+    loaded = results["loaded"]
+    pressed, z = loaded.to_pandas(), loaded.impedance
+    assert len(pressed) == len(z.force_n) * len(z.position_mm)
+    assert pressed["im_ohm_1.1kHz"].iloc[-1] == pytest.approx(z.impedance_ohm[0, -1, -1].imag)
 
 
 def test_libraries_that_are_missing_are_named(results, monkeypatch):
@@ -90,18 +94,27 @@ def test_libraries_that_are_missing_are_named(results, monkeypatch):
         ({"shape": "tri", "qualty": "fine"}, "unknown key 'qualty'; did you mean 'quality'"),
         ({"shape": "tri", "materials": {"filn": "x60"}}, "did you mean 'film'"),
         ({"shape": "tri", "quality": 3}, "quality is 3; expected text"),
+        ({"shape": "tri", "parameters": {"periodd_mm": 4}}, "parameter of tri 'periodd_mm'; did you mean 'period_mm'"),
+        ({"shape": "trii"}, "did you mean 'tri'"),
+        ({"shape": "tri", "parameters": {"period_mm": -1}}, "period_mm is -1; expected a number from"),
         ({}, "shape is missing"),
     ],
 )  # fmt: skip
 def test_wrong_names_are_refused_when_a_design_is_made(wrong, message):
-    with pytest.raises(BadInput, match=re.escape(message)):
+    with pytest.raises(SensorgenError, match=re.escape(message)):
         sg.Design(**wrong)
+
+
+def test_a_design_shows_what_differs_from_the_defaults():
+    design = sg.Design(shape="tri", parameters={"period_mm": 3}, quality="extrafine")
+    assert repr(design) == "Design(shape='tri', parameters={'period_mm': 3.0}, quality='extrafine')"
 
 
 def test_lists_of_designs():
     assert [found.verdict for found in sg.check([PLATE, PLATE])] == ["PRINT", "PRINT"]
-    with pytest.raises(BadInput, match="of one design"):
-        sg.predict([PLATE], force_n=[1.0])
+    films = [sg.Design(shape="reference", parameters={"dielectric_mm": d}) for d in (0.4, 0.6)]
+    at_rest = [each.impedance.impedance_ohm[0, 0, 0] for each in sg.predict(films, force_n=[0.0, 1.0], position_mm=50)]
+    assert at_rest[1].imag / at_rest[0].imag == pytest.approx(1.5, rel=1e-3)  # a plate's C goes as 1 over its film
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from functools import singledispatch
 from html import escape
+from io import StringIO
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ class Displayed:
         return figure(self)
 
     def to_pandas(self) -> Any:
-        """The table, the first of several, as a pandas DataFrame; raises MissingValue without pandas."""
+        """The table as a pandas DataFrame, of several that of CSV or the first; raises MissingValue without pandas."""
         from sensorgen.core.document import Table
         from sensorgen.core.errors import MissingValue
 
@@ -77,5 +78,7 @@ class Displayed:
             import pandas as pd
         except ImportError as error:
             raise MissingValue("to_pandas() needs pandas: pip install pandas") from error
+        if hasattr(self, "csv"):
+            return pd.read_csv(StringIO("".join(self.csv())))
         table = self.table() if hasattr(self, "table") else next(p for p in self.document() if isinstance(p, Table))
         return pd.DataFrame(list(table.cells), columns=[column.key or column.head for column in table.columns])

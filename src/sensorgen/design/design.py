@@ -5,7 +5,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
@@ -104,11 +104,20 @@ class Design(Strict):
     def _constructed(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         """Errors of a design that is constructed in Python, in the words of a file's."""
         try:
-            return handler(data)
+            design = handler(data)
         except ValidationError as error:
             for key in _parameters_of(data) & set(data if isinstance(data, Mapping) else ()):
                 raise BadInput(f"{key} is a parameter; expected parameters: {{{key}: {data[key]}}}") from None
             raise BadInput(problem(error, data, cls)) from None
+        if design._shape_text is None and design.shape != imported.SHAPE:
+            parameters(design.shape, design.parameters)  # refuses wrong names and numbers now, not at first use
+        return design
+
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        """Shape and what differs from the defaults; pydantic's has every field."""
+        for key, field in type(self).model_fields.items():
+            if getattr(self, key) != field.get_default(call_default_factory=True):
+                yield key, getattr(self, key)
 
     def _repr_html_(self) -> str:
         return display.html(self)

@@ -100,7 +100,7 @@ def predict(
     what: Design | Body | Sequence[Design | Body], *, force_n: ArrayLike = (), position_mm: ArrayLike = (),
     frequency_hz: ArrayLike = TONES_HZ, accuracy: float | None = None, law: str = "", tip: Tip | None = None,
     noise: float = NOISE,
-) -> Prediction | Loaded | Sweep[PredictedPoint]:  # fmt: skip
+) -> Prediction | Loaded | list[Loaded] | Sweep[PredictedPoint]:  # fmt: skip
     """Prediction of a sensor: of the print, with the drawing beside it.
 
     Parameters
@@ -108,7 +108,7 @@ def predict(
     what : Design or Body, or a sequence of these
         A design is printed: by the G-code in ``out/NAME`` where there is one, else as slicers should print it.
     force_n, position_mm : float or sequence of float
-        Rising [N], [mm]; if either is given, impedance over both comes with the prediction. Of one design alone.
+        Rising [N], [mm]; if either is given, impedance over both comes with each prediction.
     frequency_hz : float or sequence of float
         Frequencies [Hz].
     accuracy : float, optional
@@ -122,8 +122,8 @@ def predict(
 
     Returns
     -------
-    Prediction or Loaded, or Sweep
-        Each quantity with its range, divided into model, print and material; of a sequence a row for each.
+    Prediction or Loaded, or Sweep or list of Loaded
+        Each quantity with its range, divided into model, print and material; of a sequence a row or a Loaded for each.
 
     Examples
     --------
@@ -135,7 +135,7 @@ def predict(
     forces, positions = _numbers("force_n", force_n), _numbers("position_mm", position_mm)
     if not isinstance(what, Design | Body):
         if forces or positions:
-            raise BadInput("force_n and position_mm are of one design; expected Design or Body, or neither of them")
+            return [loaded(body, query, forces, positions) for _, body in _points(what)]
         return predicted_sweep("design", _points(what), query, 1, _silent)
     if not forces and not positions:
         return evaluate.evaluate(_body(what), query)
