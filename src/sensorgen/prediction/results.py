@@ -429,6 +429,28 @@ class Prediction(Displayed):
             rows_ = ((n.quantity, _times(n.factor), n.measurement, _times(n.left)) for n in self.narrowing)
             yield Table("narrowing", "", columns, tuple(rows_))
 
+    def quantities(self) -> dict[str, Bounds | None]:
+        """Quantities of the summary by name; resolutions as on a bench."""
+        force, position = self.bench()
+        return {
+            "electrode gap": self.gap, "capacitance": self.capacitance,
+            **{f"{end} electrode": bounds for end, bounds in self.resistance.items()}, "sensitivity": self.sensitivity,
+            "force resolution": force, "position resolution": position,
+        }  # fmt: skip
+
+    def table(self) -> Table:
+        """Quantities in numbers [unit]: value, lower and upper end of the range, of the drawing before the print."""
+        shown = [self.drawn, self] if self.drawn else [self]
+        bodies = [p.body.partition(",")[0] for p in shown]
+        columns = [Column(f"{body}{end}") for body in bodies for end in ("", "_lower", "_upper")]
+        rows = []
+        for name in dict.fromkeys(name for p in shown for name in p.quantities()):
+            known = [p.quantities().get(name) for p in shown]
+            unit = next((bounds.unit for bounds in known if bounds), "")
+            ends = [end for b in known for end in ((b.value, b.lower, b.upper) if b else (None, None, None))]
+            rows.append((name, unit, *ends))
+        return Table("quantities", "", (Column("quantity"), Column("unit"), *columns), tuple(rows))
+
     def document(self) -> Iterator[Part]:
         """The prediction, what its ranges hold, impedance, identifiability and error budget."""
         if self.capacitance is None:
