@@ -114,6 +114,11 @@ def test_a_design_shows_what_differs_from_the_defaults():
     assert repr(design) == "Design(shape='tri', parameters={'period_mm': 3.0}, quality='extrafine')"
 
 
+def test_the_figure_of_a_prediction_has_every_cause_of_its_ranges(results):
+    causes = [label.get_text() for label in results["predict"].plot().axes[0].get_yticklabels()]
+    assert {"top electrode: leads", "top electrode: material", "capacitance: print"} <= set(causes)
+
+
 def test_lists_of_designs():
     assert [found.verdict for found in sg.check([PLATE, PLATE])] == ["PRINT", "PRINT"]
     films = [sg.Design(shape="reference", parameters={"dielectric_mm": d}) for d in (0.4, 0.6)]

@@ -61,22 +61,6 @@ def _(of: Loaded) -> "Figure":
 
 @display.figure.register(Prediction)
 def _(of: Prediction) -> "Figure":
-    """Relative range of each quantity: model, print and material."""
-    from matplotlib.figure import Figure
+    from sensorgen.analysis.plots import results, static
 
-    quantities = {"capacitance": of.capacitance, **{f"{e} electrode": r for e, r in of.resistance.items()}}
-    shown = {name: b for name, b in quantities.items() if b and b.value}
-    figure = Figure(figsize=(7, 0.7 * len(shown) + 1.2), layout="constrained")
-    axes = figure.subplots()
-    for k, bounds in enumerate(shown.values()):
-        for shift, (kind, part) in enumerate(
-            {"model": bounds.model, "print": bounds.print, "material": bounds.material}.items()
-        ):
-            ends = [part.lower / bounds.value, part.upper / bounds.value]
-            axes.plot(ends, [k + 0.2 * (shift - 1)] * 2, "|-", color=f"C{shift}", label=kind if k == 0 else "")
-    axes.set_yticks(range(len(shown)), list(shown))
-    axes.set_xscale("log")
-    axes.set_xlabel("relative to the best value")
-    axes.legend()
-    axes.set_title(f"{of.design}, {of.body}")
-    return figure
+    return static.whole(results.ranges(of))

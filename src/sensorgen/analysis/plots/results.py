@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from sensorgen.analysis.plots.figure import BLUE, COLOURS, ORANGE, Axis, Curve, Figure, Panel, look, scale
 from sensorgen.checks.review import Review
 from sensorgen.core.document import Cell, Table
+from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.sweep import Sweep
 
 _SEVERITIES = {"info": BLUE, "warning": ORANGE, "error": "#d1242f"}  # the most severe on top
@@ -40,6 +42,21 @@ def _from_side(ends_mm: Any) -> tuple[Any, Any]:
     gaps = np.full((len(both), 1, 2), np.nan)
     x, z = np.concatenate([both, gaps], axis=1).reshape(-1, 2).T
     return x, z
+
+
+def ranges(prediction: Prediction) -> Figure:
+    """Range of each quantity over its best value, whole and by each cause."""
+    curves = {}
+    for name, bounds in prediction.quantities().items():
+        if bounds and 0.0 < bounds.value < inf:
+            causes = {"model": bounds.model, "print": bounds.print, "material": bounds.material, "leads": bounds.leads}
+            for k, (cause, part) in enumerate({"all": bounds, **causes}.items()):
+                if part and part.lower < part.upper:
+                    row, ends = f"{name}: {cause}", (part.lower / bounds.value, part.upper / bounds.value)
+                    curves[row] = Curve("points", "", [1.0], [row], [ends[0]], [ends[1]], colour=COLOURS[k])
+    panel = Panel(tuple(curves.values()), Axis("relative to the best value", log=True), Axis(names=tuple(curves)))
+    alt = "Ranges of the predicted quantities, whole and by model, print, material and leads."
+    return Figure("ranges", f"{prediction.design}, {prediction.body}", alt, {"": (panel,)})
 
 
 def sweep(result: Sweep[Any]) -> Figure:
