@@ -185,3 +185,26 @@ def test_a_withdrawn_print_binds_no_more(log, own):
     assert log.bound("S1") is None
     with pytest.raises(BadInput, match="log specimen NAME"):
         notes.specimen("S1", log)
+
+
+def verdicts(run, tmp_path, path, readings):
+    """Verdict of plates of 0.3 mm electrodes by their length [mm] and reading along one."""
+    for k, (length, ohm) in enumerate(readings):
+        design = tmp_path / f"plate{length}.yaml"
+        design.write_text(f"shape: reference\nparameters: {{length_mm: {length}}}\n")
+        assert run("add", f"P{k}", "--design", design, "--y", f"{ohm:g}", "--z", "OL").code == 0
+    with Log(path) as log:
+        return [
+            row.verdict.word for row in of_iteration(log, None, specimens=[f"P{k}" for k in range(len(readings))]).last
+        ]
+
+
+def test_prints_that_all_broke_do_not_vouch_for_each_other(run, tmp_path, path, shared_cache):
+    """A plate's 1.4 kohm by rho l / (w t), at 0.042 ohm m; no material's range reaches to 2 Mohm."""
+    assert verdicts(run, tmp_path, path, [(100, 2e6), (100, 2e6), (100, 2e6)]) == ["open electrode"] * 3
+
+
+def test_a_long_print_is_not_judged_by_short_ones(run, tmp_path, path, shared_cache):
+    ohm = {length: 0.042 * length * 1e-3 / (10e-3 * 0.3e-3) for length in (20, 100)}
+    readings = [(20, 1.5 * ohm[20]), (20, 1.4 * ohm[20]), (20, 1.6 * ohm[20]), (100, 1.5 * ohm[100])]
+    assert verdicts(run, tmp_path, path, readings) == ["intact"] * 4

@@ -74,7 +74,7 @@ def test_every_reading_is_there_once_with_its_numbers(of_thesis, by_hand):
 def test_how_many_have_a_z_of_the_order_of_their_y(of_thesis, by_hand):
     both = [(y, z) for y, z, _ in by_hand if not math.isnan(y + z)]
     shorted = sum(z <= 10 * y for y, z in both)
-    said_so = next(text for text in of_thesis.findings if "sensors are shorted or leaking (" in text)
+    said_so = next(text for text in of_thesis.findings if "sensors have a low film resistance (" in text)
     assert said_so.startswith(f"{shorted} of {len(both)} sensors")
     parted = [(y, z, name) for y, z, name in by_hand if not math.isnan(y + z) and has_gap(name)]
     assert f"{len(both) - len(parted)} by design" in said_so
@@ -82,7 +82,7 @@ def test_how_many_have_a_z_of_the_order_of_their_y(of_thesis, by_hand):
     assert sum(row.shorted for row in shares) == sum(z <= 10 * y for y, z, _ in parted)
     assert [row.total for row in shares] == [10, 16, 16]
     bare = [z <= 10 * y for y, z, name in parted if "mm" not in name]
-    assert f"{sum(bare)} of {len(bare)} such sensors are shorted or leaking" in " ".join(of_thesis.findings)
+    assert f"{sum(bare)} of {len(bare)} such sensors have a low film resistance" in " ".join(of_thesis.findings)
 
 
 def test_what_is_shorted_as_printed_says_nothing_of_the_yield(of_thesis, by_hand):
@@ -170,7 +170,7 @@ def test_a_specimen_counts_once_and_with_its_last_reading(tmp_path):
         log.add([notes.reading("40 triX .1mm 2", "0.7k", "20")])
         made = report(log, 40)
     assert any(text.startswith("1 of the 2 testable sensors is intact") for text in made.headline)
-    assert any(text.startswith("1 of 2 sensors are shorted or leaking") for text in made.findings)
+    assert any(text.startswith("1 of 2 sensors have a low film resistance") for text in made.findings)
     assert "2 earlier readings are not counted" in " ".join(w for s in made.sections for w in s.notes)
     assert len(table(made, "readings").rows) == 4
     assert [(row.by, row.specimens) for row in table(made, "yield").rows] == [("all", 2)]

@@ -43,7 +43,7 @@ _PICTURED = 0.95  # width of lines in the picture, of what the file says
 
 
 Counts = Mapping[tuple[str, int], tuple[int, int]]
-"""Prints that are shorted or leaking, and all with both resistances, by shape and layers of the film."""
+"""Prints whose film resistance is low, and all with both resistances, by shape and layers of the film."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class FilmRisk(Pinholes):
     holes_low, holes_high : float
         Least and most through-holes of the drawn prints [-].
     shorted, prints : int
-        Specimens of this shape and film in the log that are shorted or leaking, and all with both resistances, without
+        Specimens of this shape and film in the log whose film resistance is low, and all with both resistances, without
         those of Table D.1 [-].
     prior, posterior : Chance
         Before and after the log.
@@ -81,7 +81,7 @@ class FilmRisk(Pinholes):
         """Table of holes, and the probability with its assumptions."""
         yield from super().document()
         counted = (
-            f"{self.shorted} of {self.prints} prints of this shape and film in the log are shorted or leaking"
+            f"{self.shorted} of {self.prints} prints of this shape and film in the log have a low film resistance"
             if self.prints else f"no print of this shape and film: from holes and series {SERIES}"
         )  # fmt: skip
         assumed = (
@@ -95,8 +95,8 @@ class FilmRisk(Pinholes):
             every[layers] += total
         shares = ", ".join(f"{by_layers[n]} of {every[n]} with {n}" for n in sorted(every))
         known = (
-            f"shorted or leaking, by layers of the film: {shares}. More layers are not shown to help; no print had "
-            f"more than {max(every)}"
+            f"low film resistance, at most {ORDER:g} times the electrode's, by layers of the film: {shares}. More "
+            f"layers are not shown to help; no print had more than {max(every)}"
         )
         yield Facts((
             ("P(short)", f"{_words(self.posterior)}; {counted}"), ("before", _words(self.prior)),
@@ -141,7 +141,7 @@ def risk(design: Design, source: Source, log: Log | None = None) -> tuple[FilmRi
 
 
 def verdicts(log: Log, design: Design) -> tuple[int, int]:
-    """Specimens of a design's shape and film in a log that are shorted or leaking, and all with both resistances.
+    """Specimens of a design's shape and film in a log whose film resistance is low, and all with both resistances.
 
     Rows of Table D.1's series 23 are left out: the prior has them.
     """

@@ -47,7 +47,7 @@ class Compared:
     predicted : Predicted or None
         None where no design is known.
     evidence, verdict : Evidence, SignalVerdict
-        What the readings say by themselves; what an electrode should have is the median of its own shape.
+        What the readings say by themselves, of an electrode as it is usual for its prediction and shape.
     expected_ohm : Bounds or None
         Predicted reading along an electrode of the network that was measured [ohm]; None where none is predicted.
     residual : float
@@ -168,15 +168,12 @@ def of_iteration(
         built[name] = body_of(design)
         stored = [p for each in ids[name] for p in log.entries(Prediction, superseded=True, design_id=each)]
         expected[name] = stored_or_made(built[name], log, stored, begun.get(name, []), left_out)
-    by_shape: dict[str, array[float]] = {}
-    for reading in measured.rows:
-        by_shape.setdefault(reading.shape, array("d")).extend(least(_evidence(reading, None)))
-    usual = {shape: expected_from(values) for shape, values in by_shape.items()}
+    of_rows = [expected.get(names.get(reading.specimen, "")) for reading in measured.rows]
+    usual_ohm = _usual_ohm(measured.rows, of_rows)
 
     def compared(place: int) -> Compared:
-        reading = measured.rows[place]
-        of = expected.get(names.get(reading.specimen, ""))
-        evidence = _evidence(reading, of, usual[reading.shape])
+        reading, of = measured.rows[place], of_rows[place]
+        evidence = _evidence(reading, of, usual_ohm(reading.shape, of))
         return Compared(reading, of, evidence, verdict(evidence, _intact_ohm(of, reading.words.instrument)))
 
     places = range(len(measured.rows))
@@ -286,6 +283,31 @@ def _other_designs(logged: Iterable[tuple[str, str]], known: Container[str]) -> 
          "one in another version of sensorgen: drawn and predicted is what the name stands for now")
         for name, uid in sorted(others)
     ]  # fmt: skip
+
+
+def _usual_ohm(
+    rows: Iterable[Measured], of_rows: Iterable[Predicted | None]
+) -> Callable[[str, Predicted | None], float]:
+    """What an electrode of a shape and prediction should read [ohm].
+
+    The prediction times the median of measured over predicted of its shape, but no further than the prediction's range,
+    so that prints that all broke do not vouch for each other; the shape's median where none is predicted.
+    """
+    ratios: dict[tuple[str, bool], array[float]] = {}
+    for reading, of in zip(rows, of_rows, strict=True):
+        alone = of.ry_ohm if of else None
+        over = [value / (alone.value if alone else 1.0) for value in least(_evidence(reading, None))]
+        ratios.setdefault((reading.shape, alone is not None), array("d")).extend(over)
+    medians = {key: expected_from(values) for key, values in ratios.items()}
+
+    def usual(shape: str, of: Predicted | None) -> float:
+        alone = of.ry_ohm if of else None
+        median = medians[shape, alone is not None]
+        if alone is None:
+            return median
+        return alone.value if isnan(median) else min(max(alone.value * median, alone.lower), alone.upper)
+
+    return usual
 
 
 def _evidence(reading: Measured, of: Predicted | None, expected_ohm: float = nan) -> Evidence:

@@ -59,9 +59,7 @@ class YieldRow:
     ]
     yield_from: Annotated[Cell, Column("yield from", "%", "95 % confidence")]
     yield_to: Annotated[Cell, Column("yield to", "%", "95 % confidence")]
-    shorted: Annotated[
-        int, Column("shorted or leaking", "", f"film resistance at most {ORDER:g} times the electrode's")
-    ]
+    shorted: Annotated[int, Column("low film resistance", "", f"at most {ORDER:g} times the electrode's")]
     total: Annotated[int, Column("of", "", "specimens with both resistances; without designs that are printed shorted")]
     share_percent: Annotated[Cell, Column("share", "%")]
     share_from: Annotated[Cell, Column("share from", "%", "95 % confidence")]
@@ -116,14 +114,14 @@ def findings(comparison: Comparison) -> Iterator[str]:
     of = ", ".join(f"{count} {words}" for count, words in kinds if count)
     ratio = f"Median ratio {whole.median_ratio:.3g}." if isfinite(whole.median_ratio) else _OVERLOAD
     yield (
-        f"{len(such)} of {len(both)} sensors are shorted or leaking{of and f' ({of})'}: film "
-        f"resistance at most {ORDER:g} times the electrode's. {ratio}"
+        f"{len(such)} of {len(both)} sensors have a low film resistance{of and f' ({of})'}: at most {ORDER:g} times "
+        f"the electrode's. {ratio}"
     )
     yield from _parted(comparison)
     if design and whole.shorted.total:
         yield (
-            f"Without those shorted by design: {whole.shorted.count} of {whole.shorted.total} are shorted or leaking, "
-            f"{_range(whole.shorted)} of such prints, 95 % confidence."
+            f"Without those shorted by design: {whole.shorted.count} of {whole.shorted.total}, {_range(whole.shorted)} "
+            "of such prints, 95 % confidence."
         )
     for by in TESTED:
         yield from _difference(comparison, by)
@@ -136,7 +134,7 @@ def _difference(comparison: Comparison, by: str) -> Iterator[str]:
         chance = dependence(known)
         parts = ", ".join(f"{_name(g)}: {g.shorted.count} of {g.shorted.total}" for g in known)
         differ = "a significant difference" if chance < DIFFER else "no significant difference"
-        yield f"Shorted or leaking by {by}: {parts}; {differ} (p = {chance:.2g})."
+        yield f"Low film resistance by {by}: {parts}; {differ} (p = {chance:.2g})."
 
 
 def _parted(comparison: Comparison) -> Iterator[str]:
@@ -149,7 +147,7 @@ def _parted(comparison: Comparison) -> Iterator[str]:
         gap = "; ".join(f"{name} {bounds.words()}" for name, bounds in sorted(gaps.items()) if bounds)
         yield (
             f"Electrodes that touch as drawn, but have a gap as printed ({gap}): {sum(orders)} of {len(orders)} such "
-            "sensors are shorted or leaking."
+            "sensors have a low film resistance."
         )
 
 
@@ -165,8 +163,9 @@ def _name(group: Group) -> str:
 def notes(comparison: Comparison) -> tuple[str, ...]:
     """Notes on the rules of verdicts and counts."""
     how = (
-        "The verdict is the gravest of the electrode's and the film's. An electrode is compared with the median of its "
-        "own shape. A film resistance up to that of two electrodes in series is a short. A film is intact from "
+        "The verdict is the gravest of the electrode's and the film's. An electrode is compared with its prediction "
+        "times the median of measured over predicted of its shape, within the predicted range. A film resistance up to "
+        "that of two electrodes in series is a short. A film is intact from "
         f"{REACTANCES:g} times its predicted reactance at {TONES_HZ[0] / 1e3:g} kHz on, where a leak changes the "
         f"impedance by {50 / REACTANCES**2:g} %, or from the meter's highest range on; between, it leaks."
     )
@@ -239,7 +238,7 @@ def _ratios(comparison: Comparison) -> Iterator[Figure]:
     yield Figure(
         "shorts", "Film resistance over electrode resistance",
         f"Both logarithmic, for {len(rows)} of {every} readings. Below the solid line a bridge explains the reading; "
-        f"below the dashed one the sensor is shorted or leaking. Not on the axis: {zero} readings of 0 ohm, {overload} "
+        f"below the dashed one the film's is low. Not on the axis: {zero} readings of 0 ohm, {overload} "
         "of overload.", {"": (Panel(tuple(curves), x, y),)},
     )  # fmt: skip
 

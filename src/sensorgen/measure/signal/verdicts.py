@@ -161,7 +161,7 @@ def _electrode(of: Evidence, ry: float) -> tuple[str, str]:
     if ry == inf:
         return "open electrode", "the meter shows overload along the electrode"
     over, spread = ry / of.expected_ohm, max(of.ry_ohm) / ry if ry else 1.0
-    compared = f"R_Y {ry:.4g} ohm is {over:.3g} of the expected {of.expected_ohm:.4g} ohm"
+    compared = f"R_Y {ry:.4g} ohm is {over:.3g} times the expected {of.expected_ohm:.4g} ohm"
     if over >= _OPEN:
         return "open electrode", f"{compared}: {_OPEN:g} times and more is an interrupted track"
     if over > _DRY:
