@@ -8,6 +8,7 @@ from sensorgen.core.document import text
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.identifiability.identify import identify
+from sensorgen.prediction.identifiability.results import StandardErrors
 from sensorgen.prediction.query import TONES_HZ
 
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), 8.8541878128e-12 * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
@@ -78,3 +79,9 @@ def test_where_nothing_helps_it_says_so():
 def test_a_doubt_about_the_map_is_told():
     law = compression.curve("example", "made up", [0.0, 1e5], [1.0, 1.3])
     assert "above 100 kPa the curve is extended" in " ".join(printed(replace(PLATE, compression=law)).split())
+
+
+def test_errors_on_a_bench_beyond_the_sensor_are_said_as_what_it_cannot_do():
+    errors = StandardErrors(sigma_force_n=0.5, sigma_position_m=0.188)
+    assert errors.words(6.0, 0.1) == "0.5 N, cannot locate"  # no 188 mm on a sensor of 100 mm
+    assert errors.words() == "0.5 N, 188 mm"

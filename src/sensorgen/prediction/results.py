@@ -504,7 +504,9 @@ class Prediction(Displayed):
         """Identifiability and error budget; or why there are none."""
         if self.identifiability:
             yield from self.identifiability.document()
-            medians = [f"{top.name} {top.typical.words()}" for top in self.tops if top.typical]
+            medians = [
+                f"{top.name} {top.typical.words(*self.identifiability.most)}" for top in self.tops if top.typical
+            ]
             if medians:
                 yield f"median over forces and positions: {'; '.join(medians)}"
         elif self.reason:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import hypot, isnan
+from math import hypot, inf, isnan
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.document import Column, Facts, Part, Table
@@ -40,9 +40,9 @@ class StandardErrors:
     sigma_position_m: float | None
     correlation: float | None = None
 
-    def words(self) -> str:
-        """Both errors to two digits."""
-        return f"{newtons(self.sigma_force_n)}, {metres(self.sigma_position_m)}"
+    def words(self, most_n: float = inf, length_m: float = inf) -> str:
+        """Both errors to two digits, or what the sensor cannot do up to a force [N] and over its length [m]."""
+        return f"{_sensed(self.sigma_force_n, most_n)}, {_located(self.sigma_position_m, length_m)}"
 
 
 @dataclass(frozen=True)
@@ -161,9 +161,10 @@ class FrequencyChoice(StandardErrors):
 
     frequency_hz: tuple[float, ...] = ()
 
-    def words(self) -> str:
+    def words(self, most_n: float = inf, length_m: float = inf) -> str:
         """The frequencies and both errors."""
-        return f"{' + '.join(f'{f / 1e3:.3g}' for f in self.frequency_hz)} kHz ({super().words()})"
+        errors = super().words(most_n, length_m)
+        return f"{' + '.join(f'{f / 1e3:.4g}' for f in self.frequency_hz)} kHz ({errors})"
 
 
 @dataclass(frozen=True)
@@ -263,6 +264,11 @@ class Identifiability(StandardErrors):
         force, position = known.sigma_force_n, known.sigma_position_m
         return (force or 1.0) / (self.sigma_force_n or 1.0), (position or 1.0) / (self.sigma_position_m or 1.0)
 
+    @property
+    def most(self) -> tuple[float, float]:
+        """Largest force [N] and position [m] of the map, beyond whose shares an error is that of no reading."""
+        return max(self.map.force_n, key=abs), max(self.map.position_m)
+
     def document(self) -> Iterator[Part]:
         """Verdict, errors over all presses, changes that reduce them, and what each frequency contributes."""
         yield Facts(tuple(self._facts()))
@@ -289,8 +295,8 @@ class Identifiability(StandardErrors):
         if self.stiffest:
             yield "", f"{self.stiffest.verdict}."
         if self.calibrated and self.uncalibrated:
-            known, unknown = self.calibrated.words(), self.uncalibrated.words()
-            words = f"perfect model {self.words()}; after 30 known presses {known}; not calibrated {unknown}"
+            known, unknown = (errors.words(*self.most) for errors in (self.calibrated, self.uncalibrated))
+            words = f"perfect model {self.words(*self.most)}; after 30 known presses {known}; not calibrated {unknown}"
             yield "on a bench", words
         yield "over all", self._over_all()
         yield "best", self._best()
@@ -304,7 +310,7 @@ class Identifiability(StandardErrors):
     def _over_all(self) -> str:
         """Errors over the map in words."""
         force, position = self.map.of_force, self.map.of_position
-        most_n, length_m = max(self.map.force_n, key=abs), max(self.map.position_m)
+        most_n, length_m = self.most
         return "; ".join((
             f"median {_sensed(force.median, most_n)}, {_located(position.median, length_m)}",
             f"worst {_sensed(force.worst, most_n)}{force.where()}, "
