@@ -212,14 +212,20 @@ def figures(rows: Sequence[AcRow]) -> Iterator[Figure]:
     known = _compared(rows)
     if len(known) < 2:
         return
-    ends = [min(row.frequency_hz for row in known), max(row.frequency_hz for row in known)]
+    at = sorted({row.frequency_hz for row in known})
+    widest: dict[str, list[float]] = {}
+    for name, end in (("c_from_pf", min), ("c_to_pf", max)):
+        over = [(row.frequency_hz, getattr(row, name) / row.c_predicted_pf) for row in known]
+        widest[name] = [end(ratio for frequency_hz, ratio in over if frequency_hz == each) for each in at]
     curves = (
         Curve("points", "measured / predicted", [row.frequency_hz for row in known], [row.c_ratio for row in known],
               text=[f"{row.specimen}, reading {row.number}" for row in known], colour=BLUE),
-        Curve("line", "as predicted", ends, [1.0, 1.0], colour=GREY, dash="dash"),
+        Curve("line", "as predicted", [at[0], at[-1]], [1.0, 1.0], colour=GREY, dash="dash"),
+        *(Curve("line", name, at, widest[key], colour=GREY, dash="dot")
+          for name, key in (("ends of its range", "c_from_pf"), ("", "c_to_pf"))),
     )  # fmt: skip
     yield Figure(
         "capacitance", "Capacitance: measured / predicted as printed",
-        "Ratio of measured and predicted capacitance over frequency, a point for each reading.",
+        "Measured over predicted capacitance by frequency, a point for each reading; dotted: the prediction's range.",
         {"": (Panel(curves, Axis("frequency [Hz]", log=True), Axis("measured / predicted")),)},
     )  # fmt: skip
