@@ -107,7 +107,7 @@ def options(
     ]  # fmt: skip
     output = click.Option(
         ["--output", *(() if folder else ("-o",))], metavar="FILE", expose_value=False, callback=_to,
-        help="Write the answer to this file, and print its name.",
+        help="Write the answer there.",
     )  # fmt: skip
     return [*flags, output] if file else [*flags]
 

@@ -441,14 +441,10 @@ class Prediction(Displayed):
     def table(self) -> Table:
         """Quantities in numbers [unit]: value, lower and upper end of the range, of the drawing before the print."""
         shown = [self.drawn, self] if self.drawn else [self]
-        bodies = [p.body.partition(",")[0] for p in shown]
+        bodies, quantities = [p.body.partition(",")[0] for p in shown], [p.quantities() for p in shown]
         columns = [Column(f"{body}{end}") for body in bodies for end in ("", "_lower", "_upper")]
-        rows = []
-        for name in dict.fromkeys(name for p in shown for name in p.quantities()):
-            known = [p.quantities().get(name) for p in shown]
-            unit = next((bounds.unit for bounds in known if bounds), "")
-            ends = [end for b in known for end in ((b.value, b.lower, b.upper) if b else (None, None, None))]
-            rows.append((name, unit, *ends))
+        names = dict.fromkeys(name for each in quantities for name in each)
+        rows = ((name, *_numbers([each.get(name) for each in quantities])) for name in names)
         return Table("quantities", "", (Column("quantity"), Column("unit"), *columns), tuple(rows))
 
     def document(self) -> Iterator[Part]:
@@ -607,6 +603,13 @@ def resolved(error: Bounds | None, most: float, cannot: str, *, conditional: boo
     if error.upper > most:
         error = replace(error, upper=most, open="upper")
     return error.words()
+
+
+def _numbers(of: Sequence[Bounds | None]) -> Iterator[str | float | None]:
+    """Unit of a quantity, and value and ends of each range; None where there is none."""
+    yield next((bounds.unit for bounds in of if bounds), "")
+    for bounds in of:
+        yield from (bounds.value, bounds.lower, bounds.upper) if bounds else (None, None, None)
 
 
 def _words(bounds: Bounds | None) -> str | None:

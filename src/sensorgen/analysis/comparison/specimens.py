@@ -288,7 +288,7 @@ def _other_designs(logged: Iterable[tuple[str, str]], known: Container[str]) -> 
 def _usual_ohm(
     rows: Iterable[Measured], of_rows: Iterable[Predicted | None]
 ) -> Callable[[str, Predicted | None], float]:
-    """What an electrode of a shape and prediction should read [ohm].
+    """Reading that is usual along an electrode of a shape and prediction [ohm].
 
     The prediction times the median of measured over predicted of its shape, but no further than the prediction's range,
     so that prints that all broke do not vouch for each other; the shape's median where none is predicted.

@@ -2,7 +2,7 @@
 
 from cmath import phase
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import degrees, isfinite, nan, pi
 from statistics import median
@@ -213,19 +213,24 @@ def figures(rows: Sequence[AcRow]) -> Iterator[Figure]:
     if len(known) < 2:
         return
     at = sorted({row.frequency_hz for row in known})
-    widest: dict[str, list[float]] = {}
-    for name, end in (("c_from_pf", min), ("c_to_pf", max)):
-        over = [(row.frequency_hz, getattr(row, name) / row.c_predicted_pf) for row in known]
-        widest[name] = [end(ratio for frequency_hz, ratio in over if frequency_hz == each) for each in at]
     curves = (
         Curve("points", "measured / predicted", [row.frequency_hz for row in known], [row.c_ratio for row in known],
               text=[f"{row.specimen}, reading {row.number}" for row in known], colour=BLUE),
         Curve("line", "as predicted", [at[0], at[-1]], [1.0, 1.0], colour=GREY, dash="dash"),
-        *(Curve("line", name, at, widest[key], colour=GREY, dash="dot")
-          for name, key in (("ends of its range", "c_from_pf"), ("", "c_to_pf"))),
+        Curve("line", "ends of its range", at, _ends(known, "c_from_pf", min), colour=GREY, dash="dot"),
+        Curve("line", "", at, _ends(known, "c_to_pf", max), colour=GREY, dash="dot"),
     )  # fmt: skip
     yield Figure(
         "capacitance", "Capacitance: measured / predicted as printed",
         "Measured over predicted capacitance by frequency, a point for each reading; dotted: the prediction's range.",
         {"": (Panel(curves, Axis("frequency [Hz]", log=True), Axis("measured / predicted")),)},
     )  # fmt: skip
+
+
+def _ends(known: Iterable[AcRow], key: str, outermost: Callable[[float, float], float]) -> list[float]:
+    """Outermost end of the predictions' ranges over their values, by rising frequency [-]."""
+    ends: dict[float, float] = {}
+    for row in known:
+        over = getattr(row, key) / row.c_predicted_pf
+        ends[row.frequency_hz] = outermost(over, ends.get(row.frequency_hz, over))
+    return [ends[frequency_hz] for frequency_hz in sorted(ends)]
