@@ -154,7 +154,7 @@ def test_findings_name_the_crossing():
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        ({"parameters": {"pitch_x_mm": 8}}, "column_mm 8 leaves no space between columns"),
+        ({"parameters": {"pitch_x_mm": 8, "column_mm": 8}}, "column_mm 8 leaves no space between columns"),
         ({"parameters": {"length_mm": 5}}, "room for 6 rows and 0 columns"),
         ({"parameters": {"rows": 2.5}}, "rows is 2.5; expected a whole number"),
         ({"parameters": {"lead_mm": 3}}, "lead_mm 3 leaves no space between leads"),
@@ -186,3 +186,10 @@ def test_lines_that_are_spread_evenly_need_no_whole_periods():
     scene = design.drawn
     assert not list(validity.faults(scene, {body.name: mesh(body) for body in scene.bodies}))
     assert design.crossing.params.cells() == pytest.approx((8.15 / 0.85) ** 2)
+
+
+@pytest.mark.parametrize(("pitch", "track"), [(10, 8.0), (8, 6.0), (5, 4.0), (2, 1.6)])
+def test_tracks_without_a_width_leave_a_fifth_of_the_pitch_and_hold_whole_cells(pitch, track):
+    design = array(TRI if pitch > 2 else None, pitch_x_mm=pitch, pitch_y_mm=pitch)
+    assert (design.params.column_mm, design.params.row_mm) == (track, track)
+    assert array(pitch_x_mm=10).id() == array(pitch_x_mm=10, column_mm=8, row_mm=8).id()

@@ -34,6 +34,7 @@ DOT_MM = 0.5  # side of the dots of letters: wider than a line of a 0.4 mm nozzl
 WALL_MM = 0.9  # two lines: least material around a hole
 ENVELOPE = ("length_mm", "width_mm", "electrode_mm", "isolation_mm")  # that the array gives to its cell
 _WHOLE = 1e-6
+_TRACK, _PERIOD_MM = 0.8, 2.0  # most of a track's width over its pitch, and its step, if not given: cells repeat
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,14 @@ class Params(Envelope):
         default=0.0,
         metadata={"help": "Number of rows, evenly spread; 0: by pitch_y.", "range": (0.0, 1000.0), "count": True},
     )
-    column_mm: float = field(default=8.0, metadata={"help": "Width of a column.", "range": (0.2, 200.0)})
-    row_mm: float = field(default=8.0, metadata={"help": "Width of a row.", "range": (0.2, 200.0)})
+    column_mm: float = field(
+        default=0.0,
+        metadata={"help": "Width of a column; 0: four fifths of the pitch, in steps of 2 mm.", "range": (0.0, 200.0)},
+    )
+    row_mm: float = field(
+        default=0.0,
+        metadata={"help": "Width of a row; 0: four fifths of the pitch, in steps of 2 mm.", "range": (0.0, 200.0)},
+    )
     base_mm: float = field(
         default=0.4, metadata={"help": "Isolation under the rows; 0 leaves it out.", "range": (0.0, 10.0)}
     )
@@ -116,7 +123,11 @@ class Params(Envelope):
     )
 
     def __post_init__(self) -> None:
-        """Refuse tracks that touch, more crossings than can be solved, and what the cover or the base lacks."""
+        """Fill in widths; refuse tracks that touch, too many crossings, and what the cover or the base lacks."""
+        for name, pitch_mm in zip(("column_mm", "row_mm"), self.pitch, strict=True):
+            usual_mm = _TRACK * pitch_mm
+            whole_mm = _PERIOD_MM * int(usual_mm / _PERIOD_MM + _WHOLE)
+            object.__setattr__(self, name, getattr(self, name) or whole_mm or usual_mm)
         self._refuse_tracks()
         if self.labels == "engraved" and self.isolation_mm < LABEL_MM + SLIVER_MM:
             raise OutOfRange(
