@@ -16,7 +16,7 @@ from sensorgen.core import plugins as registry
 from sensorgen.core.findings import Finding
 from sensorgen.design import shapes
 from sensorgen.scene.drawing import markers, panels, svg
-from sensorgen.scene.drawing.dimensions import beside
+from sensorgen.scene.drawing.panels import beside
 from sensorgen.scene.drawing.paper import ViewFrame, fitted, spread, width, wrapped
 from sensorgen.scene.drawing.view import Measure, nearest, period, views
 from sensorgen.scene.scene import Body, Fill, Point, Prism, Scene, area_mm2, box

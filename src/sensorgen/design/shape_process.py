@@ -27,8 +27,8 @@ _MODULES = (
     *LIBRARIES, "array", "bisect", "cmath", "collections", "copy", "dataclasses", "decimal", "enum", "fractions",
     "functools", "hashlib", "heapq", "itertools", "json", "math", "numbers", "numpy.fft", "numpy.polynomial",
     "numpy.random", "operator", "random", "re", "statistics", "string", "struct", "textwrap", "time", "typing",
-    "sensorgen.scene.array", "sensorgen.scene.layers", "sensorgen.scene.polyhedra", "sensorgen.scene.revolved",
-    "sensorgen.scene.triangles", "sensorgen.scene.sections", "sensorgen.scene.strips",
+    "sensorgen.scene.patterns", "sensorgen.scene.layers", "sensorgen.scene.polyhedra", "sensorgen.scene.revolved",
+    "sensorgen.scene.patterns", "sensorgen.scene.sections", "sensorgen.scene.patterns",
 )  # fmt: skip
 
 

@@ -1,19 +1,156 @@
-"""Check of a G-code file on a simulated printer: faults, time, filament."""
+"""Check of a G-code file on a simulated printer: faults, and its needs of time, filament and purging."""
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Self
+from itertools import pairwise
+from typing import Annotated, ClassVar, Self
 
-from sensorgen.core.document import Facts, Part
+import numpy as np
+
+from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.errors import MissingValue, UnknownName
 from sensorgen.core.findings import SEVERITIES, counted
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import commands, limits
-from sensorgen.export.gcode.files import Source
 from sensorgen.export.gcode.found import GcodeFinding, merged
 from sensorgen.export.gcode.motion import executed
-from sensorgen.export.gcode.moves import Motion
-from sensorgen.export.gcode.report import FileNeeds, report
+from sensorgen.export.gcode.moves import NO_TOOL, Motion, seconds
+from sensorgen.export.gcode.paths import NOT_MODEL
+from sensorgen.export.gcode.reading import Source
+
+
+@dataclass(frozen=True)
+class ToolMaterial:
+    """Material of one tool: filament and its part that is no body [mm], volume [mm3], mass [g] where known."""
+
+    tool: Annotated[int, Column("tool")]
+    material: Annotated[str, Column("material")]
+    filament_mm: Annotated[float, Column("filament", "mm")]
+    purge_mm: Annotated[float, Column("purged", "mm")]
+    volume_mm3: Annotated[float, Column("volume", "mm3")]
+    mass_g: Annotated[float | None, Column("mass", "g")]
+
+
+@dataclass(frozen=True)
+class FileNeeds:
+    """Needs of a file.
+
+    Attributes
+    ----------
+    lines, moves, layers : int
+        How many it has; layers as its comments count, 0 without [-].
+    time_s : float
+        At the feeds of the file, without acceleration, heating and changing tools: a lower bound [s].
+    tools : tuple of ToolMaterial
+        Each tool that prints.
+    tool_changes : int
+        How often another tool is taken [-].
+    box_mm : tuple of two (float, float, float), or None
+        Around all printed lines [mm].
+    """
+
+    PLACES: ClassVar[str] = "in the file's coordinates, tower and skirt too"
+
+    lines: int
+    moves: int
+    layers: int
+    time_s: float
+    tools: tuple[ToolMaterial, ...]
+    tool_changes: int
+    box_mm: tuple[tuple[float, ...], tuple[float, ...]] | None
+
+    def document(self) -> Iterator[Part]:
+        """Tables of the file's needs."""
+        facts = [
+            ("time", f"{clock(self.time_s)} at its feeds, without acceleration, heating and changing tools"),
+            ("tool changes", str(self.tool_changes)),
+            ("layers", str(self.layers or "not counted by the file")),
+        ]
+        if self.box_mm:
+            spans = (f"{axis} {low:g} to {high:g}" for axis, low, high in zip("xyz", *self.box_mm, strict=True))
+            facts.append(("printed", f"{', '.join(spans)} mm {self.PLACES}"))
+        yield Facts(tuple(facts))
+        if self.tools:
+            yield Table.of("tools", "", self.tools)
+
+
+def clock(seconds: float) -> str:
+    """A duration as hours and minutes, or minutes and seconds.
+
+    >>> clock(59.6), clock(4000.0)
+    ('1 min 00 s', '1 h 07 min')
+    """
+    whole = round(seconds)
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02} s"
+    return f"{whole // 3600} h {round(seconds / 60) % 60:02} min"
+
+
+def report(
+    motion: Motion, machine: Printer, loaded: dict[int, str] | None = None,
+    texts: materials.Texts = materials.NO_TEXTS,
+) -> FileNeeds:  # fmt: skip
+    """Sum a file up.
+
+    Parameters
+    ----------
+    motion : Motion
+        The file.
+    machine : Printer
+        Who is to print it.
+    loaded : dict of int to str, optional
+        Material of each tool; the printer's usual ones where a tool has one only.
+    texts : mapping
+        As of :func:`sensorgen.design.materials.load`.
+    """
+    taken = [change.tool for change in motion.changes if change.tool != NO_TOOL]
+    waits = (e.command for e in motion.events if e.command.code == "G4")
+    dwells_s = sum((w.number("S") or 0.0) + (w.number("P") or 0.0) / 1000 for w in waits)
+    moving_s = float(seconds(motion, machine.max_speed_mm_s).sum())
+    return FileNeeds(
+        lines=motion.lines,
+        moves=len(motion.rows),
+        layers=int(max(motion.layer.values, default=0)),
+        time_s=moving_s + (dwells_s if 0 <= dwells_s < math.inf else 0.0),
+        tools=tuple(_tools(motion, machine, usual(machine) | (loaded or {}), texts)),
+        tool_changes=sum(a != b for a, b in pairwise(taken)),
+        box_mm=_box_mm(motion),
+    )
+
+
+def _box_mm(motion: Motion) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+    """Lowest and highest corner of what is printed [mm]; None of nothing."""
+    printed, (low, high) = (motion.extruded_mm > 0) & (motion.length_mm > 0), motion.box_mm()
+    if not printed.any():
+        return None
+    axes = range(3)  # one by one: a copy of all places would take much room
+    return tuple(float(low[printed, k].min()) for k in axes), tuple(float(high[printed, k].max()) for k in axes)
+
+
+def usual(machine: Printer) -> dict[int, str]:
+    """Material of each tool, where the printer has one usual material for it."""
+    named = list(machine.default_tools.items())
+    tools = [tool for _, tool in named]
+    return {tool: material for material, tool in named if tools.count(tool) == 1}
+
+
+def _tools(motion: Motion, machine: Printer, loaded: dict[int, str], texts: materials.Texts) -> Iterator[ToolMaterial]:
+    count, start, extruded = len(motion.rows), machine.tool_at_start(), motion.extruded_mm
+    tools = motion.tools.column(count, NO_TOOL if start is None else start).astype(np.int64)
+    kinds = motion.kind.column(count, 0).astype(np.int64)
+    waste = np.array([kind in NOT_MODEL for kind in motion.kinds])[kinds] | (motion.length_mm == 0)
+    for tool in np.unique(tools[extruded > 0]).tolist():
+        material = loaded.get(tool, "")
+        length_mm, purge_mm = (float(extruded[rows].sum()) for rows in (tools == tool, (tools == tool) & waste))
+        volume_mm3 = length_mm * math.pi / 4 * machine.filament_mm**2
+        try:
+            density = materials.load(material, texts=texts).value("density_kg_m3").value if material else None
+        except (MissingValue, UnknownName):
+            density = None
+        mass_g = None if density is None else volume_mm3 * density * 1e-6
+        yield ToolMaterial(tool, material, length_mm, purge_mm, volume_mm3, mass_g)
 
 
 @dataclass(frozen=True, kw_only=True)

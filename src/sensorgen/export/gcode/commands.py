@@ -7,12 +7,11 @@ import numpy as np
 from sensorgen.core.arrays import Whole
 from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode import allowed, macros
-from sensorgen.export.gcode.found import Findings
+from sensorgen.export.gcode import limits, words
+from sensorgen.export.gcode.found import PRUSA, Findings
 from sensorgen.export.gcode.heat import Heaters
 from sensorgen.export.gcode.moves import NO_TOOL, Event, Motion, ToolChange
 from sensorgen.export.gcode.reading import macro_name
-from sensorgen.export.gcode.remarks import PRUSA
 
 AXES = "XYZ"
 PAUSES = ("M25", "M226", "M600", "M601")
@@ -52,7 +51,7 @@ class _Simulation:
         start = machine.tool_at_start()
         self.tool = NO_TOOL if start is None else start
         self.last: ToolChange | None = None
-        self.heaters, self.turning = Heaters(machine, loaded, self.findings), macros.of_change(machine)
+        self.heaters, self.turning = Heaters(machine, loaded, self.findings), words.of_change(machine)
         self.homed: set[str] = set()
         self.levelled = not self.control.levels
         self.relative, self.absolute_e, self.fan_missed = False, True, False
@@ -187,7 +186,7 @@ class _Simulation:
         """Judge the file as a whole."""
         lines = (int(self.lines[0]), int(self.lines[-1])) if len(self.lines) else (len(self.motion.rows), 0)
         reached = (e for e in (*self.motion.events, *self.motion.odd) if e.number <= (self.end_line or e.number))
-        allowed.check(reached, self.machine, lines, self.findings)
+        limits.check_commands(reached, self.machine, lines, self.findings)
         last = max(1, self.motion.lines)
         self._ends(last)
         self._left_on(last)

@@ -18,10 +18,10 @@ from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode.crossings import CONTACT_MM, FACE_MM, NEAR_MM, Crossings, crossings
-from sensorgen.export.gcode.files import Source, text_of
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.moves import Motion, seconds
 from sensorgen.export.gcode.paths import Numbering
+from sensorgen.export.gcode.reading import Source, text_of
 
 LIFT_MM = 0.2  # 0.4 mm took twice the time and left no less contact
 COUNTED_MM = 0.5  # a crossing is longer than this

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from importlib import resources
 
 from sensorgen.core.findings import Finding
-from sensorgen.scene.drawing import dimensions, layers, markers, panels, titleblock
+from sensorgen.scene.drawing import markers, panels, paper
 from sensorgen.scene.drawing.panels import Colours
 from sensorgen.scene.drawing.paper import ARROWS, ViewPanel, box, element, escaped, line
 from sensorgen.scene.drawing.view import Measure, heights, nearest, views, widths
@@ -74,10 +74,10 @@ def svg(
     gap = min(gaps, key=lambda pair: round(pair[0].value_mm, 6), default=None)
     taken: list[Point] = [place for panel in details for place in panels.letter_places(panel).values()]
     left, room = SPLIT + 3, RIGHT - SPLIT - 3
-    rows = titleblock.rows(scene, details[0].frame, grid, gap[0] if gap else None, notes)
+    rows = markers.rows(scene, details[0].frame, grid, gap[0] if gap else None, notes)
     marks = []
     if gap and gap[0].near[0] <= gap[1].view.end_mm:  # in the view that shows it smallest
-        mark, space = dimensions.gap(gap[1], gap[0])
+        mark, space = panels.gap(gap[1], gap[0])
         taken += space
         marks.append(mark)
     parts = [
@@ -93,8 +93,8 @@ def svg(
         *markers.on_overview(shown, details, wholes),
         *markers.listed(entries, marked, LEFT + 2, FOOT + 3.5, SPLIT - LEFT - 5),
         line("frame", 6, FOOT - 2, WIDTH - 6, FOOT - 2) + line("frame", SPLIT, FOOT - 2, SPLIT, HEIGHT - 6),
-        *titleblock.legend(scene, letters, materials, left, FOOT + 3, room),
-        *titleblock.block(title, rows, left, BOTTOM - 3.5, room),
+        *markers.legend(scene, letters, materials, left, FOOT + 3, room),
+        *markers.block(title, rows, left, BOTTOM - 3.5, room),
     ]
     return _page(title, parts)
 
@@ -105,10 +105,10 @@ def _details(scene: Scene, grid: Sequence[float]) -> tuple[Lanes, list[ViewPanel
     seen = views(scene)
     lanes = heights(seen, height)
     above, below = (max(len(widths(view)[side]) for view in seen) for side in (0, 1))
-    left = LEFT + 2 + sum(map(dimensions.lane_width, lanes)) + 2
-    top = DETAIL + 7 + dimensions.ROW * above
-    bottom = OVERVIEW - 5 - dimensions.ROW * below
-    return lanes, panels.arrange(seen, max(grid[-1], height), height, (left, top, RIGHT - layers.WIDTH, bottom))
+    left = LEFT + 2 + sum(map(panels.lane_width, lanes)) + 2
+    top = DETAIL + 7 + panels.ROW * above
+    bottom = OVERVIEW - 5 - panels.ROW * below
+    return lanes, panels.arrange(seen, max(grid[-1], height), height, (left, top, RIGHT - paper.WIDTH, bottom))
 
 
 def _sections(
@@ -121,15 +121,15 @@ def _sections(
     for panel in details:
         inside = "".join(panels.materials(panel, colours))
         yield element("g", "view", inside, data_across=panel.view.section.across, data_scale=repr(panel.frame.per_mm))
-    yield from layers.grid(first, grid, right + panels.GUTTER)
-    yield from layers.labels(first, grid, right + panels.GUTTER)
-    yield from dimensions.beside(first, lanes)
+    yield from paper.grid(first, grid, right + panels.GUTTER)
+    yield from paper.labels(first, grid, right + panels.GUTTER)
+    yield from panels.beside(first, lanes)
     for panel, name in zip(details, NAMES, strict=False):
         above, below = widths(panel.view)
         over = panel.frame.top - 3
-        yield panels.caption(panel, name, min(over - dimensions.ROW * len(above) - 1.5, panel.frame.top - 5.8))
-        yield from dimensions.rows(panel.frame, above, over, -dimensions.ROW)
-        yield from dimensions.rows(panel.frame, below, panel.frame.bed + 5.4, dimensions.ROW)
+        yield panels.caption(panel, name, min(over - panels.ROW * len(above) - 1.5, panel.frame.top - 5.8))
+        yield from panels.rows(panel.frame, above, over, -panels.ROW)
+        yield from panels.rows(panel.frame, below, panel.frame.bed + 5.4, panels.ROW)
         yield panels.broken(panel)
         yield from panels.lettered(panel, letters, colours)
 
