@@ -65,7 +65,8 @@ _MODULES = {  # of commands, where it is not ``cli/NAME_command.py``
     "thesis": "verification.thesis_command",
     **dict.fromkeys(("check", "build", "slice"), "cli.printing"),
     **dict.fromkeys(("predict", "cell", "compress"), "cli.predictions"),
-    **dict.fromkeys(("show", "draw", "export"), "cli.views"),
+    **dict.fromkeys(("calibrate", "fit", "characterise"), "cli.fitting"),
+    **dict.fromkeys(("show", "draw", "export", "import"), "cli.views"),
     **dict.fromkeys(("array", "sheet", "stack"), "cli.studies"),
     **dict.fromkeys(("new", "pack", "list", "schema", "completion"), "cli.reference"),
 }

@@ -1,12 +1,29 @@
 """Figures: described once as data, drawn as pictures or on a page for the browser."""
 
+import importlib.util
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
+
+from sensorgen.core.errors import MissingValue
 
 if TYPE_CHECKING:
     from sensorgen.models.sensor import Sensor
 
-PAGE, IDENTIFIABILITY = "predict.html", "identifiability.png"
+
+def needed(*names: str) -> None:
+    """Refuse to go on without a library.
+
+    Raises
+    ------
+    MissingValue
+        It is not installed.
+    """
+    missing = [name for name in names if importlib.util.find_spec(name) is None]
+    if missing:
+        raise MissingValue(f"plots need {' and '.join(missing)}: pip install {' '.join(missing)}")
+
+
+PAGE, IDENTIFIABILITY = "predict.html", "response.png"
 STEPS = (
     IDENTIFIABILITY, "resistance.png", "reactance.png", "resistance-by-position.png", "resistance-by-force.png",
     "reactance-by-position.png", "reactance-by-force.png", "inverse-position.png", "inverse-force.png", PAGE,
@@ -35,12 +52,14 @@ def files(
     MissingValue
         Matplotlib or Plotly is not installed.
     """
-    from sensorgen.analysis.plots import identifiability, pages, response, static
-    from sensorgen.analysis.plots.libraries import needed
+    from sensorgen.analysis.plots import pages, response, static
 
     needed("matplotlib", "plotly")
     answer = response.response(sensor, frequency_hz, force_n, position_mm)
-    drawn = [identifiability.figure(sensor, frequency_hz, force_n=force_n[-1], title=title), *response.figures(answer)]
+    drawn = [
+        response.identifiability_figure(sensor, frequency_hz, force_n=force_n[-1], title=title),
+        *response.figures(answer),
+    ]
     for figure in drawn:
         yield f"{figure.key}.png", static.png(figure)
     words = (

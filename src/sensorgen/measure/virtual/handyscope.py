@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
+from sensorgen.measure.lab.devices import Clock, DeviceFault, Identity, Readings, WrongDevice
 from sensorgen.measure.signal.waveform import multisine
 from sensorgen.measure.virtual.plant import Plant
 
