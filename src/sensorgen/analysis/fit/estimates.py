@@ -1,6 +1,7 @@
 """Values of materials: resistivity and leak from multimeters, permittivity and modulus too from AC readings.
 
-For AC each specimen is calibrated (:mod:`sensorgen.prediction.calibration`); what its readings say beyond the prior counts.
+For AC each specimen is calibrated (:mod:`sensorgen.prediction.calibration`); what its readings say beyond the prior
+counts.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

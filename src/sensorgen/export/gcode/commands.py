@@ -1,4 +1,4 @@
-"""Commands of a file, executed one after the other: tools, temperatures and their limits, homing, modes, fans, macros."""
+"""Commands of a file, executed one after the other: tools, heat and its limits, homing, modes, fans, macros."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

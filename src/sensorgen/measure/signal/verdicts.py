@@ -1,6 +1,7 @@
 r"""Diagnosis of a specimen by its resistances: open electrode, short, leak, dry joint or intact.
 
-Two electrodes, R and R', with a film that leaks evenly, G in all, are a ladder of resistors. Along the electrode R, the other one floating, and between both at their contacts, with :math:`q = \sqrt{(R + R') G}`:
+Two electrodes, R and R', with a film that leaks evenly, G in all, are a ladder of resistors. Along the electrode R,
+the other one floating, and between both at their contacts, with :math:`q = \sqrt{(R + R') G}`:
 
 .. math:: R_Y = \frac{R}{R + R'} \left(R' + R\,\frac{\tanh(q/2)}{q/2}\right), \qquad
           R_Z = \frac{R + R'}{q \tanh q}
@@ -9,8 +10,8 @@ They follow from :math:`u'' = (R + R') G\,u / L^2` for the voltage u across the 
 0 at both ends. A film that leaks carries a part of the current over to the other electrode and back: R_Y falls from R
 to both in parallel. A small leak reads :math:`1/G`.
 
-Between the electrodes an intact film insulates. A short without resistance of its own, at a distance x from the contacts,
-reads :math:`2 R_Y x / L`: a reading below :math:`2 R_Y` may be a short, a reading above it is none.
+Between the electrodes an intact film insulates. A short without resistance of its own, at a distance x from the
+contacts, reads :math:`2 R_Y x / L`: a reading below :math:`2 R_Y` may be a short, a reading above it is none.
 """
 
 from collections.abc import Callable, Sequence
