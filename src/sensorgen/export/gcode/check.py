@@ -1,91 +1,20 @@
 """Check of a G-code file on a simulated printer: faults, and its needs of time, filament and purging."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
-from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import MissingValue, UnknownName
-from sensorgen.core.findings import SEVERITIES, counted
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import commands, limits
-from sensorgen.export.gcode.found import GcodeFinding, merged
 from sensorgen.export.gcode.motion import executed
 from sensorgen.export.gcode.moves import NO_TOOL, Motion, seconds
 from sensorgen.export.gcode.paths import NOT_MODEL
 from sensorgen.export.gcode.reading import Source
-
-
-@dataclass(frozen=True)
-class ToolMaterial:
-    """Material of one tool: filament and its part that is no body [mm], volume [mm3], mass [g] where known."""
-
-    tool: Annotated[int, Column("tool")]
-    material: Annotated[str, Column("material")]
-    filament_mm: Annotated[float, Column("filament", "mm")]
-    purge_mm: Annotated[float, Column("purged", "mm")]
-    volume_mm3: Annotated[float, Column("volume", "mm3")]
-    mass_g: Annotated[float | None, Column("mass", "g")]
-
-
-@dataclass(frozen=True)
-class FileNeeds:
-    """Needs of a file.
-
-    Attributes
-    ----------
-    lines, moves, layers : int
-        How many it has; layers as its comments count, 0 without [-].
-    time_s : float
-        At the feeds of the file, without acceleration, heating and changing tools: a lower bound [s].
-    tools : tuple of ToolMaterial
-        Each tool that prints.
-    tool_changes : int
-        How often another tool is taken [-].
-    box_mm : tuple of two (float, float, float), or None
-        Around all printed lines [mm].
-    """
-
-    PLACES: ClassVar[str] = "in the file's coordinates, tower and skirt too"
-
-    lines: int
-    moves: int
-    layers: int
-    time_s: float
-    tools: tuple[ToolMaterial, ...]
-    tool_changes: int
-    box_mm: tuple[tuple[float, ...], tuple[float, ...]] | None
-
-    def document(self) -> Iterator[Part]:
-        """Tables of the file's needs."""
-        facts = [
-            ("time", f"{clock(self.time_s)} at its feeds, without acceleration, heating and changing tools"),
-            ("tool changes", str(self.tool_changes)),
-            ("layers", str(self.layers or "not counted by the file")),
-        ]
-        if self.box_mm:
-            spans = (f"{axis} {low:g} to {high:g}" for axis, low, high in zip("xyz", *self.box_mm, strict=True))
-            facts.append(("printed", f"{', '.join(spans)} mm {self.PLACES}"))
-        yield Facts(tuple(facts))
-        if self.tools:
-            yield Table.of("tools", "", self.tools)
-
-
-def clock(seconds: float) -> str:
-    """A duration as hours and minutes, or minutes and seconds.
-
-    >>> clock(59.6), clock(4000.0)
-    ('1 min 00 s', '1 h 07 min')
-    """
-    whole = round(seconds)
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02} s"
-    return f"{whole // 3600} h {round(seconds / 60) % 60:02} min"
+from sensorgen.export.gcode.results import Checked, FileNeeds, ToolMaterial, merged
 
 
 def report(
@@ -151,56 +80,6 @@ def _tools(motion: Motion, machine: Printer, loaded: dict[int, str], texts: mate
             density = None
         mass_g = None if density is None else volume_mm3 * density * 1e-6
         yield ToolMaterial(tool, material, length_mm, purge_mm, volume_mm3, mass_g)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Checked(FileNeeds):
-    """Needs of a file, and findings.
-
-    Attributes
-    ----------
-    findings : tuple of GcodeFinding
-        The severe first.
-    """
-
-    findings: tuple[GcodeFinding, ...]
-
-    def errors(self, strict: bool = False) -> list[GcodeFinding]:
-        """Findings that refuse the file; with ``strict`` also the warnings."""
-        bad = SEVERITIES[: 2 if strict else 1]
-        return [f for f in self.findings if f.severity in bad]
-
-    def with_more(self, findings: Iterable[GcodeFinding]) -> Self:
-        """Add further findings."""
-        return replace(self, findings=merged([*self.findings, *findings]))
-
-    def counts(self) -> dict[str, int]:
-        """Number of findings of each severity [-]."""
-        return {severity: sum(f.severity == severity for f in self.findings) for severity in SEVERITIES}
-
-    def document(self) -> Iterator[Part]:
-        """Findings, each with what to change, and what the file takes."""
-        rows = []
-        for f in self.findings:
-            more = f" and {f.count - 1} more" if f.count > 1 else ""
-            rows += [(f.severity, f"{f.rule}, line {f.line}{more}"), ("", f"{f.message} -> {f.advice}")]
-        if rows:
-            yield Facts(tuple(rows))
-        yield from super().document()
-
-
-@dataclass(frozen=True, kw_only=True)
-class CheckedFile(Checked):
-    """A checked file by its name, the printer's, and that of the design that it was checked against, or ""."""
-
-    file: str
-    printer: str
-    design: str = ""
-
-    def document(self) -> Iterator[Part]:
-        """Findings, what the file takes, and how many findings there are."""
-        yield from super().document()
-        yield f"{self.file}: {counted(self.counts())}"
 
 
 def check(

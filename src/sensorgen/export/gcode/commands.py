@@ -10,10 +10,10 @@ from sensorgen.core.arrays import Whole
 from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import limits, words
-from sensorgen.export.gcode.found import PRUSA, Findings
 from sensorgen.export.gcode.moves import NO_TOOL, Event, Motion, ToolChange
 from sensorgen.export.gcode.reading import macro_name
-from sensorgen.export.gcode.words import Command
+from sensorgen.export.gcode.results import Findings
+from sensorgen.export.gcode.words import PRUSA, Command
 
 WITHIN_C = 15.0  # slicers raise a temperature by less after the first layer without waiting
 BED_WITHIN_C = 15.0  # sources that give the bed one temperature differ by as much: 60 to 75 C for the same TPU

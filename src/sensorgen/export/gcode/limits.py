@@ -16,8 +16,8 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer, folder
 from sensorgen.export.gcode import words
-from sensorgen.export.gcode.found import Findings, GcodeFinding
 from sensorgen.export.gcode.moves import NO_TOOL, Event, Motion
+from sensorgen.export.gcode.results import Findings, GcodeFinding
 from sensorgen.export.gcode.words import Command
 
 ANY = "*"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import BadInput
 from sensorgen.core.files import reading
-from sensorgen.export.gcode import found, words
+from sensorgen.export.gcode import words
 from sensorgen.export.gcode.moves import NO_TOOL, FileFault
 from sensorgen.export.gcode.words import Command, Effect
 
@@ -198,7 +198,7 @@ MOST_FAULTS = 10_000  # enough to know that a file is none
 _PIECE = 1 << 20  # bytes that are read at once
 _TOOL = re.compile("-?[0-9]{1,6}")
 _MOVES = ("G0", "G1", "G2", "G3")
-_note = lru_cache(maxsize=4096)(found.read)
+_note = lru_cache(maxsize=4096)(words.notes)
 
 
 class Holding:
@@ -299,17 +299,17 @@ class GcodeFile:
 
     def _remark(self, text: str, place: int) -> None:
         for quantity, value in _note(text):
-            if quantity == found.MAKER:
+            if quantity == words.MAKER:
                 self.maker = str(value)
             elif isinstance(value, str):
                 self.kind.put(place, self.kinds.setdefault(value, len(self.kinds)))
-            elif quantity == found.WIDTH:
+            elif quantity == words.WIDTH:
                 self.width_mm.put(place, value)
-            elif quantity == found.HEIGHT:
+            elif quantity == words.HEIGHT:
                 self.height_mm.put(place, value)
             else:
                 last = self.layer.values[-1] if self.layer.values else 0.0
-                self.layer.put(place, last + 1 if quantity == found.NEXT_LAYER else value)
+                self.layer.put(place, last + 1 if quantity == words.NEXT_LAYER else value)
 
     def _other(self, text: str, number: int) -> None:
         parsed = words.parse(text)
