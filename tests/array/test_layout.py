@@ -38,10 +38,10 @@ STEP = shapely.Polygon([(0, 0), (30, 0), (30, 10), (40, 10), (40, 40), (10, 40),
 def test_bodies_fill_the_print_and_do_not_overlap(cell):
     design = array(cell)
     scene = design.drawn
-    meshes = {body.name: mesh(body) for body in scene.bodies}
-    assert not list(meshes.faults(scene, meshes))
+    meshed = {body.name: mesh(body) for body in scene.bodies}
+    assert not list(meshes.faults(scene, meshed))
     assert {body.terminal for body in scene.bodies} == {"", "top", "bottom"}
-    assert meshes.electrode_gap_mm(scene, meshes) == pytest.approx(design.crossing.params.dielectric_mm)
+    assert meshes.electrode_gap_mm(scene, meshed) == pytest.approx(design.crossing.params.dielectric_mm)
     if cell is None:  # of plates: the whole box but the pads, which are open from above
         p, size = design.params, scene.size_mm
         pads = p.lead_mm * p.pad_mm * (3 * (size[2] - p.base_mm - p.electrode_mm) + 4 * p.isolation_mm)

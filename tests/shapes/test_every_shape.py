@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from sensorgen.checks.review import review
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design import shapes
 from sensorgen.design.design import make

@@ -12,8 +12,8 @@ from typing import Any, NoReturn
 
 import click
 
+from sensorgen.core.display import harmless
 from sensorgen.core.errors import SensorgenError, Unprintable, nearest
-from sensorgen.core.terminal import harmless
 from sensorgen.core.version import __version__
 
 SECTIONS = {  # what each command is for, here so that --help imports none of them

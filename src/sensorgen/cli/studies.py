@@ -93,7 +93,7 @@ def sheet_command(
         from sensorgen.analysis.plots import results
 
         picture = results.sheet_png(bounds.sheet, bounds.bounds, bounds.ports)
-        render.file(plot / f"{design.name}-results.png", picture, "wrote ")
+        render.file(plot / f"{design.name}-sheet.png", picture, "wrote ")
     return bounds
 
 

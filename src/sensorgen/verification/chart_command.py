@@ -10,9 +10,9 @@ from sensorgen.cli import render
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import arguments, options_of
 from sensorgen.cli.designs import DesignGroup
+from sensorgen.core.display import escaped
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.options import Option
-from sensorgen.core.terminal import escaped
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design

@@ -23,7 +23,7 @@ def needed(*names: str) -> None:
         raise MissingValue(f"plots need {' and '.join(missing)}: pip install {' '.join(missing)}")
 
 
-PAGE, IDENTIFIABILITY = "predict.html", "response.png"
+PAGE, IDENTIFIABILITY = "predict.html", "identifiability.png"
 STEPS = (
     IDENTIFIABILITY, "resistance.png", "reactance.png", "resistance-by-position.png", "resistance-by-force.png",
     "reactance-by-position.png", "reactance-by-force.png", "inverse-position.png", "inverse-force.png", PAGE,
