@@ -111,8 +111,7 @@ def gap_findings(slices: Slices, printer: Printer, quality: Quality, gap_mm: flo
 
     Of three electrodes or more, plates separate neighbours: there the distance is that of their faces.
     """
-    ends = [(*_ends(body), body) for body in slices.scene.bodies if body.terminal]
-    pairs = [(a, b) for a, b in pairwise(sorted(ends, key=itemgetter(0))) if a[2].terminal != b[2].terminal]
+    pairs = _neighbours(slices.scene)
     for (_, top, low), (bottom, _, high) in pairs:
         apart = gap_mm if len(pairs) == 1 else round(bottom - top, 9)
         place = (0.0, 0.0, top)
@@ -126,6 +125,12 @@ def gap_findings(slices: Slices, printer: Printer, quality: Quality, gap_mm: flo
             yield from film
             if not any(f.severity == "error" for f in film):
                 yield from _printed((low, high), place, slices, printer, apart)
+
+
+def _neighbours(scene: Scene) -> list[tuple[tuple[float, float, Body], tuple[float, float, Body]]]:
+    """Electrodes of two terminals, one above the other, each with its lowest and highest place [mm]."""
+    ends = [(*_ends(body), body) for body in scene.bodies if body.terminal]
+    return [(a, b) for a, b in pairwise(sorted(ends, key=itemgetter(0))) if a[2].terminal != b[2].terminal]
 
 
 def _ends(body: Body) -> tuple[float, float]:
@@ -173,7 +178,21 @@ def _film(
 def _printed(
     pair: Pair, place: tuple[float, float, float], slices: Slices, printer: Printer, gap_mm: float
 ) -> Iterator[Finding]:
-    """The gap as printed, where narrow parts vanish: by walls, the width up to which they do."""
+    """The gap as printed, where narrow parts vanish."""
+    by_gap = _printed_gaps(pair, slices, printer)
+    if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in by_gap):
+        return
+    gaps = (f"{'nothing' if gap is None else f'{gap:g} mm'} ({', '.join(walls)})" for gap, walls in by_gap.items())
+    yield Finding(
+        "2-printed-gap", "warning", f"{pair[0].name} / {pair[1].name}",
+        f"electrode gap: {gap_mm:g} mm drawn, as printed {', '.join(gaps)}",
+        "widen narrow parts to a line, use thinner layers, or put the faces on layer boundaries",
+        max((gap for gap in by_gap if gap is not None), default=None), round(gap_mm, 9), place_mm=place,
+    )  # fmt: skip
+
+
+def _printed_gaps(pair: Pair, slices: Slices, printer: Printer) -> dict[float | None, list[str]]:
+    """Gap to the walls that print it [mm]; None where an electrode vanishes, as parts do up to a width."""
     widths = {
         "Arachne": VANISHES * printer.nozzle_mm,
         "classic walls or plain Cura": printer.line_mm() - 2 * TOUCH_MM,  # a whole line prints
@@ -185,15 +204,7 @@ def _printed(
         boundaries = slices.layers.boundaries_mm
         gap = round(boundaries[high[0]] - boundaries[low[-1] + 1], 9) if low and high else None
         by_gap.setdefault(gap, []).append(walls)
-    if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in by_gap):
-        return
-    gaps = (f"{'nothing' if gap is None else f'{gap:g} mm'} ({', '.join(walls)})" for gap, walls in by_gap.items())
-    yield Finding(
-        "2-printed-gap", "warning", f"{pair[0].name} / {pair[1].name}",
-        f"electrode gap: {gap_mm:g} mm drawn, as printed {', '.join(gaps)}",
-        "widen narrow parts to a line, use thinner layers, or put the faces on layer boundaries",
-        max((gap for gap in by_gap if gap is not None), default=None), round(gap_mm, 9), place_mm=place,
-    )  # fmt: skip
+    return by_gap
 
 
 # Names of all rules; those from 10 on are about the design's file and about the G-code.

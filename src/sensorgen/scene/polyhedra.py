@@ -1,5 +1,6 @@
 """Bodies with flat faces: closed triangle meshes, and lofts between outlines at two heights."""
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -60,16 +61,17 @@ class Polyhedron:
             return "has a corner that is nowhere"
         if not all(0 <= number < len(self.vertices) for triangle in self.triangles for number in triangle):
             return "refers to a vertex that it does not have"
-        edges: dict[tuple[int, int], int] = {}
-        for triangle in self.triangles:
-            for k in range(3):
-                edge = (triangle[k - 1], triangle[k])
-                edges[edge] = edges.get(edge, 0) + 1
-        for (a, b), count in edges.items():
-            if count > 1 or edges.get((b, a), 0) != 1 or a == b:
-                place = ", ".join(f"{value:.6g}" for value in self.vertices[a])
-                return f"is open, or not oriented, at the edge from ({place}) mm"
+        start = self._open_edge()
+        if start is not None:
+            place = ", ".join(f"{value:.6g}" for value in self.vertices[start])
+            return f"is open, or not oriented, at the edge from ({place}) mm"
         return "encloses nothing" if not self.triangles or abs(self.volume_mm3()) < SLIVER_MM**3 else ""
+
+    def _open_edge(self) -> int | None:
+        """Vertex at which an edge begins that is not once in each direction; None of a closed, oriented surface."""
+        edges = Counter((triangle[k - 1], triangle[k]) for triangle in self.triangles for k in range(3))
+        wrong = (a for (a, b), count in edges.items() if count > 1 or edges[b, a] != 1 or a == b)
+        return next(wrong, None)
 
     def span(self, axis: str) -> Point:
         """Lowest and highest coordinate along an axis [mm]."""
@@ -202,19 +204,21 @@ class Loft:
             return "has a corner that is nowhere"
         if self.top_mm - self.bottom_mm < SLIVER_MM:
             return f"from {self.bottom_mm:g} to {self.top_mm:g} mm has no height"
-        areas = [area_mm2(outline) for outline in (self.lower, self.upper)]
+        areas = area_mm2(self.lower), area_mm2(self.upper)
         if max(map(abs, areas)) < SLIVER_MM**2:
             return "encloses nothing"
         if min(areas) < -(SLIVER_MM**2) and max(areas) > SLIVER_MM**2:
             return "is twisted: its outlines run in different senses"
-        for k in range(len(self.lower)):
-            (a, b), (c, d) = (self.lower[k - 1], self.lower[k]), (self.upper[k - 1], self.upper[k])
-            below, above = ((q[0] - p[0], q[1] - p[1]) for p, q in ((a, b), (c, d)))
-            cross = below[0] * above[1] - below[1] * above[0]
-            if abs(cross) > SLIVER_MM * max(hypot(*below), hypot(*above)):
-                return f"has a flank that is not flat, from ({a[0]:.6g}, {a[1]:.6g}) to ({b[0]:.6g}, {b[1]:.6g})"
-            if below[0] * above[0] + below[1] * above[1] < -(SLIVER_MM**2):
-                return f"has a flank that crosses itself, from ({a[0]:.6g}, {a[1]:.6g}) to ({b[0]:.6g}, {b[1]:.6g})"
+        return next(filter(None, map(self._fault_of_flank, range(len(self.lower)))), "")
+
+    def _fault_of_flank(self, k: int) -> str:
+        (a, b), (c, d) = (self.lower[k - 1], self.lower[k]), (self.upper[k - 1], self.upper[k])
+        below, above = ((q[0] - p[0], q[1] - p[1]) for p, q in ((a, b), (c, d)))
+        cross = below[0] * above[1] - below[1] * above[0]
+        if abs(cross) > SLIVER_MM * max(hypot(*below), hypot(*above)):
+            return f"has a flank that is not flat, from ({a[0]:.6g}, {a[1]:.6g}) to ({b[0]:.6g}, {b[1]:.6g})"
+        if below[0] * above[0] + below[1] * above[1] < -(SLIVER_MM**2):
+            return f"has a flank that crosses itself, from ({a[0]:.6g}, {a[1]:.6g}) to ({b[0]:.6g}, {b[1]:.6g})"
         return ""
 
     def span(self, axis: str) -> Point:

@@ -206,6 +206,15 @@ def _noted(left_out: list[tuple[str, str]], name: str) -> Iterator[None]:
         left_out.append((name, f"{type(error).__name__}: {error}; a fault of sensorgen, please report it"))
 
 
+def _at_rest(impedance_ohm: Complex) -> tuple[Complex, Complex, Complex]:
+    """Mean of rows of impedances, its standard error, and the scatter of one row [ohm]; nan of one row alone."""
+    z = impedance_ohm[np.isfinite(impedance_ohm).all(axis=1)]
+    scatter = np.full(z.shape[1], complex("nan"))
+    if len(z) > 1:
+        scatter = z.real.std(axis=0, ddof=1) + 1j * z.imag.std(axis=0, ddof=1)
+    return z.mean(axis=0), np.asarray(scatter / np.sqrt(max(len(z), 1))), scatter
+
+
 def _of_part(entry: BenchRun, lockins: Sequence[Recording], pressed: RigLog | None) -> Iterator[RecordedRun]:
     """All lock-ins of a part, each with the rig's log, or without if they cannot be joined."""
     beside: Sequence[Joined | None] = [None] * len(lockins)
@@ -222,12 +231,7 @@ def _of_part(entry: BenchRun, lockins: Sequence[Recording], pressed: RigLog | No
         marks = (f"{count} samples marked: {name}" for name, count in marked.items())
         notes = (*filter(None, [without]), *done.notes, *marks)
         valid = one.valid()
-        z = done.pairs.before_ohm if done.pairs else one.impedance_ohm[valid]
-        z = z[np.isfinite(z).all(axis=1)]
-        scatter = np.full(z.shape[1], complex("nan"))
-        if len(z) > 1:
-            scatter = z.real.std(axis=0, ddof=1) + 1j * z.imag.std(axis=0, ddof=1)
-        rest, spread = z.mean(axis=0), np.asarray(scatter / np.sqrt(max(len(z), 1)))
+        rest, spread, scatter = _at_rest(done.pairs.before_ohm if done.pairs else one.impedance_ohm[valid])
         raw = np.flatnonzero(valid)[thinned_together(one.impedance_ohm, valid)]
         smooth = thinned_together(done.filtered_ohm)
         yield RecordedRun(

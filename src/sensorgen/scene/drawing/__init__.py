@@ -213,6 +213,15 @@ def listed(
 def _rows(mark: Marked, letters: Mapping[str, str], room: float, most: int) -> list[tuple[str, str]]:
     """Class and text of one finding's lines: what and where, then what to do."""
     f = mark.finding
+    what = f"{f.rule}{_where(f, letters)}: {f.message}"
+    advice = f"waived: {f.waiver}" if f.waiver else f.advice
+    rows = wrapped(what, room, most)
+    further = wrapped(advice, room, most - len(rows)) if advice and len(rows) < most else []
+    return [("faint" if f.waiver else "", row) for row in rows] + [("faint", row) for row in further]
+
+
+def _where(f: Finding, letters: Mapping[str, str]) -> str:
+    """Body, layers and places of a finding in brackets, or ""."""
     where = [" / ".join(letters.get(name, name) for name in f.body.split(" / "))] if f.body else []
     if f.layer is not None:
         where.append(f"layer {f.layer}" if f.last_layer is None else f"layers {f.layer} to {f.last_layer}")
@@ -220,12 +229,7 @@ def _rows(mark: Marked, letters: Mapping[str, str], room: float, most: int) -> l
         where.append(f"{f.count} places")
     elif f.layer is not None and f.place_mm is not None:
         where.append(f"at x {f.place_mm[0]:g}, y {f.place_mm[1]:g}")
-    place = f" ({', '.join(where)})" if where else ""
-    what = f"{f.rule}{place}: {f.message}"
-    advice = f"waived: {f.waiver}" if f.waiver else f.advice
-    rows = wrapped(what, room, most)
-    further = wrapped(advice, room, most - len(rows)) if advice and len(rows) < most else []
-    return [("faint" if f.waiver else "", row) for row in rows] + [("faint", row) for row in further]
+    return f" ({', '.join(where)})" if where else ""
 
 
 ROW = 3.6
