@@ -243,6 +243,14 @@ class TippedParams(ArrayParams):
             raise OutOfRange(f"tip_mm {self.tip_mm:g} is wider than root_mm {self.root_mm:g}: expected at most that")
 
 
+def _rims(p: ArrayParams, starts: Sequence[float], film: float, roof: float) -> list[Piece]:
+    """Boxes around the cells, up to the sides of the sensor [mm]."""
+    (x0, y0), (x1, y1) = starts, (p.length_mm - starts[0], p.width_mm - starts[1])
+    sides = ((0.0, x0, 0.0, p.width_mm), (x1, p.length_mm, 0.0, p.width_mm))
+    rims = (*sides, (x0, x1, 0.0, y0), (x0, x1, y1, p.width_mm))
+    return [box(*rim, film, roof) for rim in rims if rim[1] - rim[0] > 1e-9 and rim[3] - rim[2] > 1e-9]
+
+
 def array_scene(
     p: ArrayParams,
     fill: Fill,
@@ -273,10 +281,7 @@ def array_scene(
     support: list[Piece] = []
     if fill.support:
         support = [piece for x, y in places for piece in around(x, y, rounded(film))]
-        (x0, y0), (x1, y1) = starts, (p.length_mm - starts[0], p.width_mm - starts[1])
-        sides = ((0.0, x0, 0.0, p.width_mm), (x1, p.length_mm, 0.0, p.width_mm))
-        rims = (*sides, (x0, x1, 0.0, y0), (x0, x1, y1, p.width_mm))
-        support += [box(*rim, film, roof) for rim in rims if rim[1] - rim[0] > 1e-9 and rim[3] - rim[2] > 1e-9]
+        support += _rims(p, starts, film, roof)
     bodies = (
         Body("film", fill.film, p.plate(low, film)),
         Body("support", fill.support, tuple(support)),

@@ -113,15 +113,7 @@ class Polyhedron:
         """Outlines in which the plane ``axis = at_mm`` cuts it, in ``PLANE[axis]`` [mm]; those with holes in parts."""
         across = AXES.index(axis)
         first, second = (AXES.index(other) for other in PLANE[axis])
-        below = [vertex[across] <= at_mm for vertex in self.vertices]
-        after: dict[tuple[int, int], tuple[int, int]] = {}
-        for triangle in self.triangles:
-            sides = [(triangle[k - 1], triangle[k]) for k in range(3)]
-            up = next((s for s in sides if below[s[0]] and not below[s[1]]), None)
-            if up:
-                down = next((b, a) for a, b in sides if below[b] and not below[a])
-                # (x, z) is left-handed: seen against y, triangles run the other way round
-                after[up if axis == "y" else down] = down if axis == "y" else up
+        after = self._crossed([vertex[across] <= at_mm for vertex in self.vertices], axis)
 
         def crossing(edge: tuple[int, int]) -> Point:
             a, b = (self.vertices[number] for number in edge)
@@ -132,6 +124,18 @@ class Polyhedron:
 
         loops = [without_straight([crossing(edge) for edge in ring]) for ring in _rings(after)]
         return _without_holes([loop for loop in loops if len(loop) > 2 and abs(area_mm2(loop)) > SLIVER_MM**2])
+
+    def _crossed(self, below: list[bool], axis: str) -> dict[tuple[int, int], tuple[int, int]]:
+        """Edges that a plane crosses, each with the next one, by the vertices that lie below it."""
+        after: dict[tuple[int, int], tuple[int, int]] = {}
+        for triangle in self.triangles:
+            sides = [(triangle[k - 1], triangle[k]) for k in range(3)]
+            up = next((s for s in sides if below[s[0]] and not below[s[1]]), None)
+            if up:
+                down = next((b, a) for a, b in sides if below[b] and not below[a])
+                # (x, z) is left-handed: seen against y, triangles run the other way round
+                after[up if axis == "y" else down] = down if axis == "y" else up
+        return after
 
     def moved(self, move: Move) -> "Polyhedron":
         """It at another place, scaled or turned."""

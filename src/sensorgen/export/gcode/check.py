@@ -35,18 +35,23 @@ def report(
         As of :func:`sensorgen.design.materials.load`.
     """
     taken = [change.tool for change in motion.changes if change.tool != NO_TOOL]
-    waits = (e.command for e in motion.events if e.command.code == "G4")
-    dwells_s = sum((w.number("S") or 0.0) + (w.number("P") or 0.0) / 1000 for w in waits)
     moving_s = float(seconds(motion, machine.max_speed_mm_s).sum())
     return FileNeeds(
         lines=motion.lines,
         moves=len(motion.rows),
         layers=int(max(motion.layer.values, default=0)),
-        time_s=moving_s + (dwells_s if 0 <= dwells_s < math.inf else 0.0),
+        time_s=moving_s + _dwells_s(motion),
         tools=tuple(_tools(motion, machine, usual(machine) | (loaded or {}), texts)),
         tool_changes=sum(a != b for a, b in pairwise(taken)),
         box_mm=_box_mm(motion),
     )
+
+
+def _dwells_s(motion: Motion) -> float:
+    """Time that a file waits [s]; 0 where it is no time."""
+    waits = (e.command for e in motion.events if e.command.code == "G4")
+    time_s = sum((w.number("S") or 0.0) + (w.number("P") or 0.0) / 1000 for w in waits)
+    return time_s if 0 <= time_s < math.inf else 0.0
 
 
 def _box_mm(motion: Motion) -> tuple[tuple[float, ...], tuple[float, ...]] | None:

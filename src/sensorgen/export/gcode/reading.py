@@ -322,37 +322,40 @@ class GcodeFile:
         for what in parsed.faults:
             self._fault(place, what, severe=not words.is_meta(text))
         for here, command in enumerate(parsed.commands, place):
-            if command.code[0] == "T":
-                self._select(command.code[1:], here)
-            elif command.code in self._sets:
-                holding, value = self._sets[command.code]
-                holding.put(here, value)
-            elif command.code == "M98":
-                if self._macro and (called := self._macro.fullmatch(macro_name(command))):
-                    self._select(called[1], here, macro=True)
+            if command.code in _MOVES:
+                self._move(command, here)
             else:
-                self._position(command, here)
-            if command.code not in _MOVES:
+                self._no_move(command, here)
                 self.events.append((here, command))
 
-    def _fault(self, place: int, what: str, *, severe: bool = True) -> None:
-        if len(self.faults) < MOST_FAULTS:
-            self.faults.append(FileFault(place >> SHIFT, what, severe))
-
-    def _position(self, command: Command, place: int) -> None:
-        """Add a row for a move, or for a command that names the place anew."""
-        if command.code in _MOVES:
-            self._row(place, float(command.code[1:]), [self._number(command, name, place) for name in WORDS])
-            if any(letter not in WORDS for letter, _ in command.words):
-                self.odd.append((place, command))
-            if command.has("H") and command.number("H") != 0:
-                self._fault(place, f"H{command.text('H')} of {command.code}: an axis goes until it meets something")
+    def _no_move(self, command: Command, place: int) -> None:
+        """Follow a command that selects a tool, sets a mode or names the place anew."""
+        if command.code[0] == "T":
+            self._select(command.code[1:], place)
+        elif command.code in self._sets:
+            holding, value = self._sets[command.code]
+            holding.put(place, value)
+        elif command.code == "M98":
+            if self._macro and (called := self._macro.fullmatch(macro_name(command))):
+                self._select(called[1], place, macro=True)
         elif command.code == "G92":
             named = command.has("XYZE")
             self._row(place, PLACE, [self._number(command, name, place) if named else 0.0 for name in "XYZE"])
         elif command.code == "G28":
             homed = [name for name in "XYZ" if command.has(name)] or "XYZ"
             self._row(place, PLACE, [0.0 if name in homed else np.nan for name in "XYZ"])
+
+    def _fault(self, place: int, what: str, *, severe: bool = True) -> None:
+        if len(self.faults) < MOST_FAULTS:
+            self.faults.append(FileFault(place >> SHIFT, what, severe))
+
+    def _move(self, command: Command, place: int) -> None:
+        """Add a row for a move."""
+        self._row(place, float(command.code[1:]), [self._number(command, name, place) for name in WORDS])
+        if any(letter not in WORDS for letter, _ in command.words):
+            self.odd.append((place, command))
+        if command.has("H") and command.number("H") != 0:
+            self._fault(place, f"H{command.text('H')} of {command.code}: an axis goes until it meets something")
 
     def _row(self, place: int, code: float, numbers: Sequence[float]) -> None:
         self._own_places.append(place)

@@ -137,16 +137,21 @@ def _read(text: str) -> GcodeLine:
     return GcodeLine(parsed, remark, tuple(faults[:_MOST_FAULTS]))
 
 
+def _begin(commands: list[tuple[str, list[tuple[str, str]]]], letter: str, value: str) -> list[str]:
+    """Add a command without words."""
+    number = float(value) if _NUMBER.fullmatch(value) else math.inf
+    if math.isinf(number):
+        return [f"{letter}{value[:20]} is no command"]
+    commands.append((f"{letter}{int(number)}" if number == int(number) else f"{letter}{value}", []))
+    return []
+
+
 def _take(commands: list[tuple[str, list[tuple[str, str]]]], letter: str, value: str) -> list[str]:
     """Add a word to the last command, or start the next one."""
     if letter == "N" and not commands:
         return []
     if letter in "GM" or (letter == "T" and not commands):
-        number = float(value) if _NUMBER.fullmatch(value) else math.inf
-        if math.isinf(number):
-            return [f"{letter}{value[:20]} is no command"]
-        commands.append((f"{letter}{int(number)}" if number == int(number) else f"{letter}{value}", []))
-        return []
+        return _begin(commands, letter, value)
     if not commands:
         return [f"{letter}{value} stands before any command"]
     quoted = value.startswith('"')

@@ -62,6 +62,14 @@ class Part:
     settings: Mapping[str, str] = field(default_factory=dict)
 
 
+def _check_part(part: Part) -> None:
+    if not re.fullmatch("#[0-9a-fA-F]{6}", part.colour):
+        raise BadInput(f"colour {part.colour!r} of body {part.name!r} is not of the form #rrggbb")
+    if part.extruder < 0:
+        raise OutOfRange(f"extruder {part.extruder} of body {part.name!r} is below 0: slicers count from 0")
+    _check_mesh(part)
+
+
 def check(title: str, parts: Sequence[Part], centre_mm: tuple[float, float]) -> None:
     """Refuse what no slicer could print, or what the file could not say.
 
@@ -92,17 +100,9 @@ def check(title: str, parts: Sequence[Part], centre_mm: tuple[float, float]) -> 
         raise BadInput(f"two bodies are called {twice[0]!r}: name each body once")
     texts = [("title", title)]
     for part in parts:
-        settings = (*part.settings.keys(), *part.settings.values())
-        texts += [
-            ("name", part.name),
-            ("material", part.material),
-            *((f"setting of body {part.name!r}", s) for s in settings),
-        ]
-        if not re.fullmatch("#[0-9a-fA-F]{6}", part.colour):
-            raise BadInput(f"colour {part.colour!r} of body {part.name!r} is not of the form #rrggbb")
-        if part.extruder < 0:
-            raise OutOfRange(f"extruder {part.extruder} of body {part.name!r} is below 0: slicers count from 0")
-        _check_mesh(part)
+        texts += [("name", part.name), ("material", part.material)]
+        texts += [(f"setting of body {part.name!r}", s) for s in (*part.settings.keys(), *part.settings.values())]
+        _check_part(part)
     for what, text in texts:
         if wrong := _NOT_XML.search(text):
             raise BadInput(f"{what} {text!r} has the character {wrong[0]!r}, which a 3MF cannot hold: remove it")
