@@ -73,7 +73,7 @@ def test_it_imports_the_scene_and_the_standard_library_only(name):
         "sensorgen.core.errors",
         "sensorgen.core.version",
         "sensorgen.scene",
-        *(f"sensorgen.scene.{part}" for part in ("array", "polyhedra", "revolved", "scene", "strips", "triangles")),
+        *(f"sensorgen.scene.{part}" for part in ("patterns", "polyhedra", "revolved", "scene")),
         "sensorgen.design",
         "sensorgen.design.shapes",
         f"sensorgen.design.shapes.{name}",
