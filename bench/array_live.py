@@ -18,12 +18,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from sensorgen.design.design import make
-from sensorgen.measure.lab.clock import SimulatedClock
-from sensorgen.measure.lab.frame_live import FrameFeed, MapView, follow
-from sensorgen.measure.lab.frame_recorder import recorder
+from sensorgen.measure.lab.devices import SimulatedClock
+from sensorgen.measure.lab.frame_live import FrameFeed, MapView, follow, recorder
 from sensorgen.measure.lab.frame_stream import FrameStream, checked
 from sensorgen.measure.lab.port import SimulatedPort
-from sensorgen.measure.virtual.frame_stream import sender
+from sensorgen.measure.virtual.array import sender
 from sensorgen.prediction.array.live import LiveMaps
 from sensorgen.prediction.array.model import array_model
 from sensorgen.prediction.array.readout import ArrayReadout

@@ -12,7 +12,7 @@ from sensorgen.asprinted.pinholes import pinholes
 from sensorgen.design.design import make
 from sensorgen.export.gcode.check import check
 from sensorgen.export.gcode.drags import lift
-from sensorgen.export.gcode.files import text_of
+from sensorgen.export.gcode.reading import text_of
 from sensorgen.export.slicing import alone, sliced
 
 RESULTS = Path(__file__).parent / "results"

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from sensorgen.core.errors import NotInstalled
-from sensorgen.measure.lab.clock import RealClock, SimulatedClock
+from sensorgen.measure.lab.devices import RealClock, SimulatedClock
 from sensorgen.measure.lab.handyscope import Handyscope, load
 from sensorgen.measure.lab.live import LiveView, Sample
 from sensorgen.measure.signal.waveform import TONES_HZ

@@ -167,7 +167,7 @@ def against_union() -> list[dict[str, object]]:
 
 def models() -> list[dict[str, object]]:
     """Time and error of the capacitance bounds against reference values (tests/reference)."""
-    from sensorgen.core import plugins as registry
+    from sensorgen.core import lazy as registry
     from sensorgen.design import shapes
     from sensorgen.models import columns
     from sensorgen.scene.scene import Fill

@@ -8,19 +8,19 @@ from generate import DOCS, sensorgen
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from sensorgen.analysis.plots import sheet, static
-from sensorgen.analysis.plots.identifiability import figure
+from sensorgen.analysis.plots import results, static
+from sensorgen.analysis.plots.response import identifiability_figure
 from sensorgen.asprinted import printed as prints
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.design import make
 from sensorgen.export import slicing
+from sensorgen.export.layered import closed
 from sensorgen.models.sheet import Sheet, SheetPatch, contact_sets, localise
 from sensorgen.models.stack import GroundTie
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.double_layer import WIRINGS, Touching, press_at, stacked
 from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
-from sensorgen.scene.geometry.layered import closed
 from sensorgen.scene.geometry.meshes import mesh
 
 PICTURES = DOCS / "pictures"
@@ -34,7 +34,7 @@ PREDICTED = ("inverse-position",)
 def identifiability(name: str) -> None:
     """Resolution of force and position of one sensor."""
     title, data, law = SENSORS[name]
-    shown = figure(build_sensor(drawn(make(data)), law).sensor, TONES_HZ, title=title)
+    shown = identifiability_figure(build_sensor(drawn(make(data)), law).sensor, TONES_HZ, title=title)
     (PICTURES / f"identifiability-{name}.png").write_bytes(static.png(shown))
 
 
@@ -54,7 +54,7 @@ def bounds_on_a_sheet() -> None:
     ports = contact_sets(film)
     tones = np.array(TONES_HZ)
     bounds = {name: localise(film, pairs, tones, press, per_newton, places=7) for name, pairs in ports.items()}
-    (PICTURES / "sheet-bounds.png").write_bytes(sheet.png(film, bounds, ports))
+    (PICTURES / "sheet-bounds.png").write_bytes(results.sheet_png(film, bounds, ports))
 
 
 def touch() -> None:

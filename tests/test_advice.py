@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from sensorgen.checks.review import review
-from sensorgen.core import yamledit, yamlfile
+from sensorgen.core import yamlfile
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding, grouped
@@ -163,7 +163,7 @@ def test_seven_layers_of_one_sentence_are_one_finding():
     ("a:\nb: 1\n", {("a",): 2.0}, "a: 2\nb: 1\n"),
 ])  # fmt: skip
 def test_a_value_is_changed_in_place(text, values, after):
-    assert yamledit.changed(text, values, "x.yaml") == after
+    assert yamlfile.changed(text, values, "x.yaml") == after
     for path, value in values.items():
         at = yamlfile.parse(after, "x.yaml")
         for key in path:
@@ -174,7 +174,7 @@ def test_a_value_is_changed_in_place(text, values, after):
 @pytest.mark.parametrize("text", ["a: [1, 2]\n", "a: {b: 1}\n", "- a\n", "a: &x 1\nb: *x\n"])
 def test_what_cannot_be_changed_in_place_is_refused(text):
     with pytest.raises(BadInput):
-        yamledit.changed(text, {("a",): 1.0}, "x.yaml")
+        yamlfile.changed(text, {("a",): 1.0}, "x.yaml")
 
 
 def test_the_budget_includes_what_the_prediction_took(plate):

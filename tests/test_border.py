@@ -13,7 +13,7 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.capacitance_answer import CapacitanceQuestion, answer
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.scene.border import share
-from sensorgen.scene.geometry import meshes, outline_files, validity
+from sensorgen.scene.geometry import meshes, outline_files
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" width="{}" height="{}" viewBox="0 0 {} {}">'
 
@@ -142,7 +142,7 @@ def test_every_body_is_cut(tmp_path, shape):
         inside = region.buffer(1e-6)
         assert inside.covers(shapely.MultiPoint(cut[body.name].vertices_mm[:, :2]))
     assert cut["bottom_electrode"].volume_mm3() == pytest.approx(region.area * 0.3, rel=1e-6)
-    assert not validity.faults(design.drawn, cut)
+    assert not meshes.faults(design.drawn, cut)
     whole = make({"shape": shape, "parameters": {"length_mm": 11.2, "width_mm": 7.2}})
     assert design.id() != whole.id()
     assert make(design.model_dump(mode="json")).id() == design.id()

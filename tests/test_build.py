@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from no_numbers import unpredicted
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.core.errors import Unprintable
 from sensorgen.design import design, shapes
 from sensorgen.export.threemf import FAMILIES

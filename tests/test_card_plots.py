@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sensorgen.analysis.plots import identifiability as plots
+from sensorgen.analysis.plots import response as plots
 from sensorgen.analysis.plots.static import drawn as drawn_by
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
@@ -17,7 +17,7 @@ PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), 8.8541878128e-12 * 4.68 * 0
 
 def drawn_of(*given, **how):
     """The card as matplotlib has it."""
-    figure = plots.figure(*given, **how)
+    figure = plots.identifiability_figure(*given, **how)
     return drawn_by(figure, figure.choices[""], figure.title)
 
 

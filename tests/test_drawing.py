@@ -12,11 +12,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.core.findings import Finding
 from sensorgen.design import shapes
-from sensorgen.scene.drawing import markers, panels, svg
-from sensorgen.scene.drawing.dimensions import beside
+from sensorgen.scene import drawing
+from sensorgen.scene.drawing import panels, svg
+from sensorgen.scene.drawing.panels import beside
 from sensorgen.scene.drawing.paper import ViewFrame, fitted, spread, width, wrapped
 from sensorgen.scene.drawing.view import Measure, nearest, period, views
 from sensorgen.scene.scene import Body, Fill, Point, Prism, Scene, area_mm2, box
@@ -213,7 +214,7 @@ def test_a_finding_beyond_the_detail_is_marked_at_its_edge_and_in_the_overview()
 def test_findings_are_ranked_and_the_rest_is_counted() -> None:
     severities = ["info", "warning", "error"] * 4
     found = [finding(k, severity=s, layer=1 + k, waiver="known" if k == 2 else "") for k, s in enumerate(severities)]
-    ranked = markers.ranked(found)
+    ranked = drawing.ranked(found)
     assert [mark.kind for mark in ranked] == ["error"] * 3 + ["warning"] * 4 + ["info"] * 4 + ["waived"]
     page = drawn(scene_of("tri"), *found)
     assert set(spots(page)) == set(range(1, 13))
@@ -228,12 +229,12 @@ def test_findings_are_ranked_and_the_rest_is_counted() -> None:
 
 def test_a_finding_of_many_layers_stands_once_with_its_count() -> None:
     found = [finding(layer=k, message=f"a strip of {k / 10:g} mm is narrower than a line") for k in (3, 5, 4)]
-    (mark,) = markers.ranked([*found])
+    (mark,) = drawing.ranked([*found])
     assert (mark.finding.count, mark.finding.layer, mark.finding.last_layer) == (3, 3, 5)
     said = " ".join(words(drawn(scene_of("tri"), *found)))
     assert "layers 3 to 5, 3 places" in said
     assert said.count("narrower than a line") == 1
-    assert len(markers.ranked([*found, finding(body="top")])) == 2
+    assert len(drawing.ranked([*found, finding(body="top")])) == 2
 
 
 def test_the_text_of_a_finding_is_whole() -> None:

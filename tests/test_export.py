@@ -11,9 +11,9 @@ from sensorgen.asprinted.printed import body
 from sensorgen.cli import cli
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import make
+from sensorgen.export.layered import closed, voxels
 from sensorgen.models import fem2d
 from sensorgen.prediction.bodies import estimated
-from sensorgen.scene.geometry.layered import closed, voxels
 from sensorgen.scene.layers import LayerRegions
 from sensorgen.workflows.export import export
 

@@ -14,11 +14,10 @@ from scipy import stats
 
 from no_numbers import roughly_at_rest
 from sensorgen.analysis.comparison.allowed import AllowedValues
-from sensorgen.analysis.comparison.moved import Movable
+from sensorgen.analysis.comparison.expected import Movable
 from sensorgen.analysis.fit import Fit, Fitted, Untold, fit, text
+from sensorgen.analysis.fit.estimates import OfSpecimen, _together, leak, resistivity, values
 from sensorgen.analysis.fit.fitting import held_back
-from sensorgen.analysis.fit.resistance import leak, resistivity
-from sensorgen.analysis.fit.tones import OfSpecimen, _together, values
 from sensorgen.cli import cli
 from sensorgen.core.document import text as document_text
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
@@ -27,7 +26,7 @@ from sensorgen.design.design import make
 from sensorgen.design.materials import own
 from sensorgen.design.specimen_name import design_of, parse
 from sensorgen.measure.log import Log, bench, notes, prints
-from sensorgen.measure.signal.leakage import across_ohm, along_ohm
+from sensorgen.measure.signal.verdicts import across_ohm, along_ohm
 from sensorgen.models import columns
 from sensorgen.prediction import capacitance as prediction_of_c
 from sensorgen.prediction.bodies import default_body, drawn

@@ -216,7 +216,7 @@ def report(asked):
 
 def fit(asked):
     """The sensor from which ``fit`` starts."""
-    from sensorgen.analysis.comparison.moved import Movable
+    from sensorgen.analysis.comparison.expected import Movable
     from sensorgen.prediction.bodies import default_body
 
     return Answer(_of_sensor(asked, lambda design: Movable(default_body(design)).model))

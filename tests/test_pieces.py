@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from sensorgen.core.errors import BadInput
-from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.geometry import meshes
 from sensorgen.scene.polyhedra import Loft, Polyhedron
 from sensorgen.scene.revolved import CHORD_MM, Revolved
 from sensorgen.scene.scene import Body, Move, Prism, Scene, area_mm2, box, content, rectangle
@@ -172,7 +172,7 @@ def test_its_mesh_is_closed_and_has_its_volume(piece):
     body = Body("it", "x60", (piece,))
     scene = Scene((body,), (10.0, 10.0, 10.0))
     found = meshes.mesh(body)
-    assert validity.faults(scene, {"it": found}) == []
+    assert meshes.faults(scene, {"it": found}) == []
     assert found.volume_mm3() == pytest.approx(piece.volume_mm3(), rel=1e-2 if piece in ROUND.values() else 1e-12)
 
 

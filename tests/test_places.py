@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from sensorgen.core import cache as cached
-from sensorgen.core import paths as places
+from sensorgen.core import files as places
 from sensorgen.design.materials import own
 from sensorgen.measure.log import logbook
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from manifold3d import CrossSection, FillRule
 
-from sensorgen.scene.overlay import parts
+from sensorgen.scene.layers import overlay_parts
 from sensorgen.scene.scene import Body, Outline, Prism, Scene, area_mm2, box, rectangle, rounded
 
 SIZE = (4.0, 3.0)
@@ -33,7 +33,7 @@ def scene(*bodies: Body, size: tuple[float, float] = SIZE) -> Scene:
 
 def areas(found: Scene) -> dict[tuple[str, ...], float]:
     """Area by the names of what lies there, from bottom to top [mm2]."""
-    (part,) = parts(found)
+    (part,) = overlay_parts(found)
     named = {tuple(layer.body.name for layer in c.layers): c.right_mm - c.left_mm for c in part.columns}
     assert len(named) == len(part.columns)
     assert part.depth_mm == 1.0
@@ -104,7 +104,7 @@ def test_outlines_that_share_edges_leave_nothing_between_them():
 
 def test_layers_stand_from_bottom_to_top():
     hat = upright("hat", regular(6, 0.5), 0.9, 1.1)
-    (part,) = parts(scene(hat, upright("foot", regular(6, 0.9), 0.3, 0.9)))
+    (part,) = overlay_parts(scene(hat, upright("foot", regular(6, 0.9), 0.3, 0.9)))
     assert {tuple(layer.bottom_mm[0] for layer in c.layers) for c in part.columns} == {(0,), (0, 0.3), (0, 0.3, 0.9)}
 
 
@@ -119,7 +119,7 @@ def test_what_lies_beyond_the_sensor_or_under_nothing_is_told():
     amid, beyond = (
         upright(n, regular(8, 0.5, at), 0.3, 1.0) for n, at in (("pillar", (4.0, 1.5)), ("far", (2.0, 4.0)))
     )
-    (part,) = parts(replace(scene(amid, beyond), size_mm=(5.0, 3.0, 2.0)))
+    (part,) = overlay_parts(replace(scene(amid, beyond), size_mm=(5.0, 3.0, 2.0)))
     looks = {tuple(layer.body.name for layer in c.layers): c.right_mm for c in part.columns}
     assert looks["pillar",] == pytest.approx(looks["floor", "pillar"], rel=1e-10)
     assert looks[()] == pytest.approx(3.0 - looks["pillar",], rel=1e-10)
@@ -142,7 +142,7 @@ WEDGE = Prism("y", ((0.0, 0.3), (1.0, 0.3), (0.5, 0.8)), 0.0, 3.0)
 )
 def test_what_has_no_plan_is_refused(bodies, said):
     with pytest.raises(ValueError, match=said):
-        parts(scene(*bodies))
+        overlay_parts(scene(*bodies))
 
 
 def test_bodies_that_touch_do_not_overlap():

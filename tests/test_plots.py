@@ -15,13 +15,15 @@ import pytest
 from drawn_sensor import sensor_of
 
 from sensorgen.analysis import plots
-from sensorgen.analysis.plots import identifiability, libraries, pages, static
+from sensorgen.analysis.plots import figure as figure_data
+from sensorgen.analysis.plots import pages, static
 from sensorgen.analysis.plots.figure import Map, frequency, scale
 from sensorgen.analysis.plots.response import (
     LARGEST,
     MOST_FREQUENCIES,
     QUANTITIES,
     figures,
+    identifiability_figure,
     inverse,
     quantity,
     response,
@@ -215,7 +217,7 @@ def test_a_sensor_that_a_press_does_not_move_is_drawn_too():
     """Bare conductors: R is 0 throughout, and no colour scale or contour may trip over it."""
     flat = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.0, 0.0), 7e-10, unconfined(6e6))
     of = response(flat, (1e3,), (0.0, 1.0), (20.0, 80.0))
-    assert static.png(identifiability.figure(flat, (1e3,), force_n=1.0))
+    assert static.png(identifiability_figure(flat, (1e3,), force_n=1.0))
     for figure in figures(of):
         assert figure.key not in ("resistance", "inverse-force") or static.png(figure)
         assert shown(figure).axes
@@ -223,9 +225,9 @@ def test_a_sensor_that_a_press_does_not_move_is_drawn_too():
 
 
 def test_a_missing_library_is_named(monkeypatch):
-    monkeypatch.setattr(libraries.importlib.util, "find_spec", lambda name: None if name == "plotly" else name)
+    monkeypatch.setattr(figure_data.importlib.util, "find_spec", lambda name: None if name == "plotly" else name)
     with pytest.raises(MissingValue, match=r"plots need plotly: pip install plotly"):
-        libraries.needed("matplotlib", "plotly")
+        figure_data.needed("matplotlib", "plotly")
 
 
 def decoded(values):

@@ -3,7 +3,7 @@
 import pytest
 
 from sensorgen import models
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.core.errors import BadInput, UnknownName, Unprintable
 from sensorgen.core.findings import Finding
 from sensorgen.design import shapes

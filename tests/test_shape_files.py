@@ -62,6 +62,13 @@ def test_shapes_that_ship_come_back_as_they_are(module):
     assert form.__doc__ == module.__doc__
 
 
+def test_a_file_that_names_a_module_as_before_runs():
+    text = Path(tri.__file__).read_text("utf-8")
+    assert "sensorgen.scene.patterns" in text
+    form = shape(text.replace("sensorgen.scene.patterns", "sensorgen.scene.triangles"), "before")
+    assert form.scene(form.Params(), Fill()) == tri.scene(tri.Params(), Fill())
+
+
 def test_a_shapes_own_refusal_keeps_its_words():
     form = shape(Path(tri.__file__).read_text("utf-8"), "same")
     with pytest.raises(OutOfRange, match=r"lower_height_mm 0.6 must stay below hang_height_mm 0.5"):

@@ -22,9 +22,9 @@ from sensorgen.design.printer import folder
 from sensorgen.export import slicing, threemf
 from sensorgen.export.gcode import paths
 from sensorgen.export.gcode.check import check
-from sensorgen.export.slicers import run, stl
+from sensorgen.export.slicers import run
 from sensorgen.export.slicing import Placed, alone, sliced
-from sensorgen.export.threemf.part import box_mm
+from sensorgen.export.threemf.core import box_mm
 from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import Body, box
 from sensorgen.workflows.slice import slice_design
@@ -123,7 +123,7 @@ def test_a_plates_3mf_counts_as_its_family_does(family, expected, tmp_path):
 
 def test_an_stl_has_its_triangles(tmp_path):
     mesh = slicing.plate_parts([alone(SMALL)])[0].mesh
-    content = stl.content(mesh, np.array([1.0, 0.0, 0.0]))
+    content = run.content(mesh, np.array([1.0, 0.0, 0.0]))
     assert len(content) == 84 + 50 * len(mesh.triangles)
     first = np.frombuffer(content[84 + 12 : 84 + 48], dtype="<f4").reshape(3, 3)
     assert first == pytest.approx(mesh.vertices_mm[mesh.triangles[0]] + [1.0, 0.0, 0.0], abs=1e-5)

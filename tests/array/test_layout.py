@@ -15,7 +15,7 @@ from sensorgen.design.design import make
 from sensorgen.design.values import resistivities
 from sensorgen.prediction.array.model import array_model, wire_table
 from sensorgen.prediction.slices import combined
-from sensorgen.scene.geometry import validity
+from sensorgen.scene.geometry import meshes
 from sensorgen.scene.geometry.meshes import mesh
 
 TRI = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
@@ -38,10 +38,10 @@ STEP = shapely.Polygon([(0, 0), (30, 0), (30, 10), (40, 10), (40, 40), (10, 40),
 def test_bodies_fill_the_print_and_do_not_overlap(cell):
     design = array(cell)
     scene = design.drawn
-    meshes = {body.name: mesh(body) for body in scene.bodies}
-    assert not list(validity.faults(scene, meshes))
+    meshed = {body.name: mesh(body) for body in scene.bodies}
+    assert not list(meshes.faults(scene, meshed))
     assert {body.terminal for body in scene.bodies} == {"", "top", "bottom"}
-    assert validity.electrode_gap_mm(scene, meshes) == pytest.approx(design.crossing.params.dielectric_mm)
+    assert meshes.electrode_gap_mm(scene, meshed) == pytest.approx(design.crossing.params.dielectric_mm)
     if cell is None:  # of plates: the whole box but the pads, which are open from above
         p, size = design.params, scene.size_mm
         pads = p.lead_mm * p.pad_mm * (3 * (size[2] - p.base_mm - p.electrode_mm) + 4 * p.isolation_mm)
@@ -184,7 +184,7 @@ def test_lines_that_are_spread_evenly_need_no_whole_periods():
     cell = {"shape": "porous", "parameters": {"dielectric_mm": 0.6, "space_mm": 0.35}}
     design = array(cell, column_mm=8.15, row_mm=8.15)
     scene = design.drawn
-    assert not list(validity.faults(scene, {body.name: mesh(body) for body in scene.bodies}))
+    assert not list(meshes.faults(scene, {body.name: mesh(body) for body in scene.bodies}))
     assert design.crossing.params.cells() == pytest.approx((8.15 / 0.85) ** 2)
 
 

@@ -9,7 +9,7 @@ from insole_sessions import Insole
 from in_process import run
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.array_sessions import refuse_swapped, session
+from sensorgen.measure.array_frames import refuse_swapped, session
 from sensorgen.prediction.array import sessions as calibration
 from sensorgen.prediction.array.elements import ArraySession, LawForm, Past, behind, doubtful_time, lagged
 from sensorgen.prediction.array.sessions import calibrated, law_of, stored, study

@@ -7,7 +7,7 @@ from shapely import affinity
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import make
-from sensorgen.scene.geometry import validity
+from sensorgen.scene.geometry import meshes
 from sensorgen.scene.geometry.meshes import mesh
 from sensorgen.scene.layers import region_at
 from sensorgen.workflows.tiles import tiles
@@ -45,7 +45,7 @@ def test_names_can_be_read_beside_the_pads(kind, pads):
             place = (along, middle + across) if pads == "left" else (middle - across, along)
             assert shapely.contains_xy(letters, *place) == (dot == "#"), (i, j)
     assert size[:2] == (design.layout.size_mm if pads == "bottom" else design.layout.size_mm[::-1])
-    assert not list(validity.faults(scene, {body.name: mesh(body) for body in scene.bodies}))
+    assert not list(meshes.faults(scene, {body.name: mesh(body) for body in scene.bodies}))
 
 
 def test_names_keep_apart():

@@ -6,8 +6,7 @@ import pytest
 from sensorgen.analysis.plots import array as plots
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
-from sensorgen.measure.array_frames import read
-from sensorgen.measure.array_sessions import of_frames
+from sensorgen.measure.array_frames import of_frames, read
 from sensorgen.measure.virtual.array import nodal, printed, walked
 from sensorgen.prediction.array.frames import at_rest, inverted
 from sensorgen.prediction.array.model import array_model

@@ -7,7 +7,7 @@ import pytest
 from sensorgen.checks import rules as checks
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality, load_printer, load_quality
-from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.geometry import meshes
 from sensorgen.scene.scene import Body, Prism, Scene, box
 
 Findings = Callable[..., list[Finding]]
@@ -61,7 +61,7 @@ def findings(printer, fine) -> Findings:
 
     def check(scene: Scene, rule: str = "", body: str = "", gap_mm: float | None = None, **on) -> list[Finding]:
         if gap_mm is None:
-            gap_mm = validity.electrode_gap_mm(scene, {b.name: meshes.mesh(b) for b in scene.bodies})
+            gap_mm = meshes.electrode_gap_mm(scene, {b.name: meshes.mesh(b) for b in scene.bodies})
         found = checks.findings(scene, on.get("printer", printer), on.get("quality", fine), gap_mm)
         return [f for f in found if f.rule.startswith(rule) and body in ("", f.body)]
 

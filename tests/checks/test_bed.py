@@ -2,7 +2,7 @@
 
 import pytest
 
-from sensorgen.checks import bed
+from sensorgen.checks import rules
 from sensorgen.checks.review import review
 from sensorgen.design.design import make
 from sensorgen.design.printer import load_printer
@@ -26,13 +26,13 @@ HAIR = 1e-6
     ],
 )
 def test_the_bed_is_the_limit(printer, size, value_and_limit):
-    found = list(bed.check(Scene((), size), load_printer(printer)))
+    found = list(rules.bed_findings(Scene((), size), load_printer(printer)))
     assert [(f.value_mm, f.limit_mm) for f in found] == value_and_limit
     assert all(f.severity == "error" and f.advice and f.margin_mm < 0 for f in found)
 
 
 def test_a_sensor_that_fits_the_other_way_round_is_told_so():
-    (found,) = bed.check(Scene((), (100.0, 300.0, 1.0)), load_printer("diabase-h5"))
+    (found,) = rules.bed_findings(Scene((), (100.0, 300.0, 1.0)), load_printer("diabase-h5"))
     assert "swap length and width" in found.advice
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from sensorgen.checks.review import review
-from sensorgen.checks.slices import Layers
+from sensorgen.checks.widths import Layers
 from sensorgen.design.design import make
 from sensorgen.design.shapes import rect, tri
 from sensorgen.scene.scene import Body, Fill, Scene, box

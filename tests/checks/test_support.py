@@ -3,8 +3,8 @@
 import pytest
 import shapely
 
+from sensorgen.checks.bridges import findings
 from sensorgen.checks.review import review
-from sensorgen.checks.support import findings
 from sensorgen.design import design
 from sensorgen.scene.layers import LayerRegions
 

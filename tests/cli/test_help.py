@@ -18,7 +18,7 @@ from sensorgen.cli import COMMANDS, cli
 from sensorgen.cli.commands import command as command_of
 from sensorgen.cli.commands import flag_of as option_of
 from sensorgen.cli.designs import of_design
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.design import materials, printer, shapes
 
 DESIGNS = Path(__file__).parents[2] / "designs"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.core import paths, yamlfile
+from sensorgen.core import files, yamlfile
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design import design, materials, packs, shape_files
 from sensorgen.measure import accuracy
@@ -503,7 +503,7 @@ def test_a_fault_of_a_shape_is_one_finding_with_how_many_sensors_have_it(run, he
 
 
 def test_a_source_that_a_command_wrote_is_tested_where_it_is(run):
-    file = paths.data(packs.SOURCES, "materials") / "bars-1.yaml"
+    file = files.data(packs.SOURCES, "materials") / "bars-1.yaml"
     file.parent.mkdir(parents=True, exist_ok=True)
     text = "about: bars\nmaterials: {etpu: {youngs_modulus_pa: {value: 2.0e7, low: 1.0e6, high: 1.0e8}}}\n"
     file.write_text(text, "utf-8")

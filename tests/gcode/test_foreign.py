@@ -13,8 +13,8 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import load_printer
 from sensorgen.export.gcode import paths
 from sensorgen.export.gcode.check import check
-from sensorgen.export.gcode.files import text_of
 from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.reading import text_of
 from sensorgen.export.gcode.ready import ready
 
 from .good import LAB, MAKER, OWN  # isort: skip

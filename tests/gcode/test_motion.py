@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import Macro, load_printer
 from sensorgen.export.gcode import paths
-from sensorgen.export.gcode.macros import effect
 from sensorgen.export.gcode.motion import follow
-from sensorgen.export.gcode.words import parse
+from sensorgen.export.gcode.words import effect, parse
 
 R = "M83"
 

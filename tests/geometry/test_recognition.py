@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.design import shapes
 from sensorgen.scene.geometry import surfaces
 from sensorgen.scene.geometry.meshes import mesh

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.core.errors import CadFailed, Unwritable
 from sensorgen.design import shapes
 from sensorgen.scene.geometry import solids

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from sensorgen.design.shapes import rect, reference, tri
-from sensorgen.scene.geometry.meshes import Mesh, mesh
-from sensorgen.scene.geometry.validity import electrode_gap_mm, faults
+from sensorgen.scene.geometry.meshes import Mesh, electrode_gap_mm, faults, mesh
 from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 
 

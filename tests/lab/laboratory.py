@@ -8,7 +8,7 @@ from typing import Any
 
 from sensorgen.design.design import make
 from sensorgen.measure.lab import catalogue, experiment, run
-from sensorgen.measure.lab.clock import SimulatedClock
+from sensorgen.measure.lab.devices import SimulatedClock
 from sensorgen.measure.lab.safety import RunDevices
 from sensorgen.measure.log import Log
 from sensorgen.measure.virtual import mechanics

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import serving
 from laboratory import LIMIT_N, specimen
 
-from sensorgen.measure.lab.clock import RealClock
+from sensorgen.measure.lab.devices import RealClock
 from sensorgen.measure.virtual import mechanics, reprap
 from sensorgen.measure.virtual.reprap import RepRapFirmware
 from sensorgen.measure.virtual.scpi import SimulatedLcrMeter

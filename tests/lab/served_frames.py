@@ -3,7 +3,7 @@
 import numpy as np
 
 from sensorgen.measure.lab.frame_stream import checked
-from sensorgen.measure.virtual.frame_stream import FrameSender
+from sensorgen.measure.virtual.array import FrameSender
 from sensorgen.prediction.array.readout import ArrayReadout
 
 HERTZ = 10e3

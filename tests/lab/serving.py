@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Protocol
 
-from sensorgen.measure.lab.clock import Clock
+from sensorgen.measure.lab.devices import Clock
 
 _TURN = threading.Lock()
 _POLL_S = 0.001

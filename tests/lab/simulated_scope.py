@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.measure.lab.clock import Clock
+from sensorgen.measure.lab.devices import Clock
 from sensorgen.measure.virtual.handyscope import (
     BITS,
     INPUT_LSB,

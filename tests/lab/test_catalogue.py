@@ -9,8 +9,7 @@ from lab.spring_plant import SpringPlant
 from sensorgen.core.errors import BadInput, NotInstalled, UnknownName
 from sensorgen.core.records import Strict
 from sensorgen.measure.lab import catalogue
-from sensorgen.measure.lab.clock import SimulatedClock
-from sensorgen.measure.lab.devices import DeviceFault
+from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock
 
 ROLES = {
     "smac-lcc10": "actuator", "reprapfirmware": "stage", "hp-4284a": "impedance", "keysight-e4980a": "impedance",

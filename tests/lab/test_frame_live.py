@@ -11,14 +11,11 @@ from in_process import run, run_all
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import load
 from sensorgen.measure.array_frames import read
-from sensorgen.measure.lab.clock import SimulatedClock
-from sensorgen.measure.lab.devices import DeviceFault
-from sensorgen.measure.lab.frame_live import FrameFeed, MapView, follow
-from sensorgen.measure.lab.frame_recorder import recorder
+from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock
+from sensorgen.measure.lab.frame_live import FrameFeed, MapView, follow, recorder
 from sensorgen.measure.lab.frame_stream import FrameForm, FrameStream
 from sensorgen.measure.lab.port import SimulatedPort
-from sensorgen.measure.virtual.array import simulated, walked
-from sensorgen.measure.virtual.frame_stream import FrameSender
+from sensorgen.measure.virtual.array import FrameSender, simulated, walked
 from sensorgen.prediction.array.frames import inverted
 from sensorgen.prediction.array.live import LiveMaps
 from sensorgen.prediction.array.model import array_model
@@ -252,7 +249,7 @@ def test_the_command_records_a_virtual_array(folder):
 def test_frames_of_another_array_are_refused(folder):
     import serving
 
-    from sensorgen.measure.lab.clock import RealClock
+    from sensorgen.measure.lab.devices import RealClock
 
     form = FrameForm(2, 3)
     with serving.pseudo_terminal(Device([form.header(), *lines(3)] * 50), RealClock()) as path:

@@ -6,8 +6,7 @@ import serving
 from served_frames import HERTZ, Device, lines, walker
 
 from sensorgen.measure.lab import catalogue
-from sensorgen.measure.lab.clock import RealClock, SimulatedClock
-from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
+from sensorgen.measure.lab.devices import DeviceFault, RealClock, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.frame_stream import FrameForm, FrameStream, checked, unchecked
 from sensorgen.measure.lab.port import SimulatedPort
 

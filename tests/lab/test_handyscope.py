@@ -8,8 +8,7 @@ import pytest
 from simulated_scope import SimulatedScope
 
 from sensorgen.core.errors import BadInput, NotInstalled, OutOfRange
-from sensorgen.measure.lab.clock import RealClock, SimulatedClock
-from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
+from sensorgen.measure.lab.devices import DeviceFault, RealClock, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.handyscope import Bridge, Handyscope, gains, load
 from sensorgen.measure.signal.waveform import TONES_HZ, WEIGHTS, multisine
 from sensorgen.measure.virtual.handyscope import FAULTS, SERIAL, Analyser, PhasorMeter

@@ -9,8 +9,7 @@ import pytest
 
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.measure.lab import catalogue, rigs
-from sensorgen.measure.lab.clock import SimulatedClock
-from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
+from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.experiment import Device
 
 pytest.importorskip("pymeasure", reason="PyMeasure is not installed: pip install 'sensorgen[pymeasure]'")

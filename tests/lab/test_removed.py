@@ -6,7 +6,7 @@ import pytest
 from laboratory import asked, laboratory
 
 from sensorgen.measure.lab import recorder, run
-from sensorgen.measure.lab.clock import SimulatedClock
+from sensorgen.measure.lab.devices import SimulatedClock
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.bench import read_again
 from sensorgen.measure.signal.run import processed

@@ -10,8 +10,7 @@ from serving import http_server, pseudo_terminal
 from lab.spring_plant import SpringPlant
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.measure.lab import reprap
-from sensorgen.measure.lab.clock import RealClock, SimulatedClock
-from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
+from sensorgen.measure.lab.devices import DeviceFault, RealClock, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.port import HttpPort, SerialPort, SimulatedPort, faults
 from sensorgen.measure.virtual.reprap import FAULTS, RepRapFirmware
 

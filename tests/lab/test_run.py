@@ -14,8 +14,7 @@ from sensorgen.cli import cli
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.measure.lab import recorder, run, safety
-from sensorgen.measure.lab.clock import SimulatedClock
-from sensorgen.measure.lab.devices import DeviceFault
+from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock
 from sensorgen.measure.lab.experiment import Choice
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.bench import read_again

@@ -10,8 +10,7 @@ from serving import tcp_server
 from lab.spring_plant import SpringPlant
 from sensorgen.core.errors import OutOfRange
 from sensorgen.measure.lab import meters
-from sensorgen.measure.lab.clock import RealClock, SimulatedClock
-from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
+from sensorgen.measure.lab.devices import DeviceFault, RealClock, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.port import SimulatedPort, VisaPort
 from sensorgen.measure.virtual import scpi
 

@@ -9,8 +9,7 @@ from serving import pseudo_terminal
 from lab.spring_plant import SpringPlant
 from sensorgen.core.errors import OutOfRange
 from sensorgen.measure.lab import smac
-from sensorgen.measure.lab.clock import SimulatedClock
-from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
+from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.port import SerialPort, SimulatedPort
 from sensorgen.measure.virtual.smac import FAULTS, SmacController
 
@@ -319,7 +318,7 @@ def test_garbage_is_no_value(line):
 def test_the_same_bytes_over_a_pseudo_terminal():
     """Over pyserial, with the real clock; every reading waits for its own answers."""
     pytest.importorskip("serial")
-    from sensorgen.measure.lab.clock import RealClock
+    from sensorgen.measure.lab.devices import RealClock
 
     clock, plant = RealClock(), SpringPlant(extension_mm=1.0)
     plant.time_s = clock.now()

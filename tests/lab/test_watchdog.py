@@ -7,8 +7,7 @@ from laboratory import asked, laboratory
 from lab.spring_plant import SpringPlant
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.lab import run, smac
-from sensorgen.measure.lab.clock import SimulatedClock
-from sensorgen.measure.lab.devices import DeviceFault
+from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock
 from sensorgen.measure.lab.port import SimulatedPort
 from sensorgen.measure.log import Log
 from sensorgen.measure.virtual.smac import SmacController

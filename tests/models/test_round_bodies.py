@@ -11,7 +11,7 @@ from sensorgen.design.design import make
 from sensorgen.models import fem2d, fem3d
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.capacitance import capacitance, of_sensor
-from sensorgen.scene.array import ArrayParams
+from sensorgen.scene.patterns import ArrayParams
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Body, Prism, Scene, box
 from sensorgen.solvers.electrostatics.bounds import whole

@@ -7,8 +7,7 @@ import pytest
 from scipy import stats
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.measure.signal.leakage import leak_s
-from sensorgen.measure.signal.verdicts import WORDS, Evidence, expected_from, least, verdict
+from sensorgen.measure.signal.verdicts import WORDS, Evidence, expected_from, leak_s, least, verdict
 from sensorgen.measure.signal.yields import groups, independence, share
 from sensorgen.models import line
 

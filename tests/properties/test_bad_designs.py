@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from sensorgen import cli
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design import design, shapes

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from sensorgen.checks.review import review
 from sensorgen.design.design import make, parameters
 from sensorgen.design.shapes import rect, reference, tri
-from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.geometry import meshes
 from sensorgen.scene.scene import Fill, Scene
 
 
@@ -78,7 +78,7 @@ def by_material(scene: Scene, made) -> dict[str, float]:
 
 def assert_bodies(scene: Scene, volumes_mm3: dict[str, float]) -> None:
     made = {body.name: meshes.mesh(body) for body in scene.bodies}
-    assert validity.faults(scene, made) == []
+    assert meshes.faults(scene, made) == []
     expected = {material: v for material, v in volumes_mm3.items() if v > 0}
     assert by_material(scene, made) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
@@ -206,5 +206,5 @@ def reviewed(data):
     held = review(design)
     assert not any(f.rule == "0-body" for f in held.findings)
     expected = gap_mm(design)
-    assert validity.electrode_gap_mm(design.printed, held.meshes) == pytest.approx(expected, abs=1e-9)
+    assert meshes.electrode_gap_mm(design.printed, held.meshes) == pytest.approx(expected, abs=1e-9)
     assert any(f.rule == "1-short" for f in held.findings) is (expected == 0)

@@ -8,7 +8,8 @@ import pytest
 from scipy.signal import lfilter
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording import Recording, RecordingClock, Source, joined, joined_all, offset, rig
+from sensorgen.measure.recording import Recording, RecordingClock, Source, joined, joined_all, rig
+from sensorgen.measure.recording.rig import _covariance
 from sensorgen.measure.recording.samples import blank, rebuilt, sifted
 
 MADE = made.presses(12)
@@ -188,7 +189,7 @@ def test_errors_of_weights_hold_for_noise_that_hangs_together():
         noise = lfilter([1], [1, -0.7], rng.standard_normal(1500))
         weights = np.linalg.lstsq(model, noise, rcond=None)[0]
         found.append(weights[-2:])
-        said.append(np.sqrt(np.diag(offset._covariance(model, noise - model @ weights))))
+        said.append(np.sqrt(np.diag(_covariance(model, noise - model @ weights))))
     np.testing.assert_allclose(np.mean(said, axis=0), np.std(found, axis=0), rtol=0.15)
 
 

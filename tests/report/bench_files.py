@@ -6,7 +6,7 @@ import made
 import numpy as np
 import scipy.io as sio
 
-from sensorgen.analysis.comparison.moved import moved
+from sensorgen.analysis.comparison.expected import moved
 from sensorgen.prediction.bodies import default_body
 from sensorgen.prediction.planning import sensor_model
 

@@ -10,16 +10,15 @@ import pytest
 from bench_files import ladder
 
 from sensorgen.analysis.comparison import of_iteration, predicted
-from sensorgen.analysis.comparison.expected import stored_or_made
-from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
-from sensorgen.analysis.report.provenance import origins
+from sensorgen.analysis.comparison.expected import Movable, at_rest, moved, pressed, stored_or_made
+from sensorgen.analysis.report.contents import origins
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.design.specimen_name import design_of, parse
 from sensorgen.measure.log import Log, notes, verify
 from sensorgen.measure.log.prints import prediction
-from sensorgen.measure.signal.leakage import across_ohm, along_ohm, electrode_and_leak, leak_s
+from sensorgen.measure.signal.verdicts import across_ohm, along_ohm, electrode_and_leak, leak_s
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor

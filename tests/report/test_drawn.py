@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sensorgen.analysis.comparison import runs
+from sensorgen.analysis.comparison import measured
 from sensorgen.analysis.plots.figure import Axis, Curve, Figure, Panel, thinned
 from sensorgen.analysis.plots.interactive import data, packed
 from sensorgen.analysis.plots.static import files, whole
@@ -92,7 +92,7 @@ def test_what_is_no_number_is_a_gap():
 
 def test_differences_of_all_recordings_on_scales_of_their_own(recorded):
     with Log(recorded) as log:
-        every = list(runs.runs(log, 30, []))
+        every = list(measured.runs(log, 30, []))
     (chart,) = compared(every)
     assert len(chart.choices) == 7
     for k, panels in enumerate(chart.choices.values()):
@@ -130,7 +130,7 @@ def test_what_impedance_could_tell_is_the_cards_map():
 
 def test_presses_of_a_run(recorded):
     with Log(recorded) as log:
-        found = next(runs.runs(log, 30, []))
+        found = next(measured.runs(log, 30, []))
     assert len(found.pairs.time_s) == 7
     assert not any("no log of the rig" in note for note in found.notes)
 
@@ -171,7 +171,7 @@ def test_a_table_with_columns_of_its_own_is_not_left_out(tmp_path):
     left_out = []
     with Log(tmp_path / "log.db", create=True) as log:
         log_recording(log, "31 triX .1mm", tmp_path / "own.csv", None, columns=columns)
-        (found,) = runs.runs(log, 31, left_out)
+        (found,) = measured.runs(log, 31, left_out)
     assert left_out == []
     assert found.rest_ohm[0].real == pytest.approx(1001, abs=0.1)
     assert any("no log of the rig" in note for note in found.notes)

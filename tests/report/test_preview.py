@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from sensorgen.analysis.plots import pages, shades
-from sensorgen.analysis.preview import geometry
+from sensorgen.analysis import preview
+from sensorgen.analysis.plots import layers, pages
 from sensorgen.design.design import make
 from sensorgen.scene.geometry.meshes import mesh
 from sensorgen.workflows.decision import page_of
@@ -70,7 +70,7 @@ def test_electrodes_are_seen_on_a_dark_ground(browser, made):
     assert browser.run("document.documentElement.dataset.theme") == "dark"
     shown, ground = (browser.run(colour.format(name)) for name in ("--c0", "--ground"))
     rgb = [[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in (shown, ground)]
-    assert shades.contrast(*rgb) > 3
+    assert layers.contrast(*rgb) > 3
 
 
 def test_the_section_plane_removes_what_is_before_it(browser, made):
@@ -168,7 +168,7 @@ def test_the_packed_shells_are_the_meshes():
     """Unpacked by the format's description: every vertex to a micrometre, every triangle, volumes to the rounding."""
     scene = make(TRI).printed
     names = [body.name for body in scene.bodies]
-    block = geometry.block({}, {"drawn": scene}, names)
+    block = preview.block({}, {"drawn": scene}, names)
     size = int.from_bytes(block[:4], "little")
     counts = json.loads(block[4 : 4 + size])["counts"]["drawn"]
     rest = np.frombuffer(block[4 + size :], "<i4")
@@ -194,9 +194,7 @@ def test_edges_of_a_box_are_twelve():
 def test_sections_have_the_area_of_the_drawing():
     """Of the plate, which is a stack of rectangles: widths times thicknesses."""
     design = make({"shape": "reference"})
-    (figure,) = geometry.figures(
-        design.printed, design.printed, ["bottom_electrode", "dielectric", "top_electrode"], []
-    )
+    (figure,) = preview.figures(design.printed, design.printed, ["bottom_electrode", "dielectric", "top_electrode"], [])
     end = float(re.search(r"to ([\d.]+) of", figure.caption)[1])
     areas = []
     for _, d in figure.drawn:
@@ -213,14 +211,14 @@ def _area(xy):
 @pytest.mark.parametrize("colour", ["#000000", "#ffffff", "#303436", "#f2c14e", "#14171b"])
 @pytest.mark.parametrize("number", [0, 1, 2])
 def test_no_body_is_lost_on_its_ground(colour, number):
-    for shade, ground in zip(shades.shades(colour, number), (shades.LIGHT, shades.DARK), strict=True):
+    for shade, ground in zip(layers.shades(colour, number), (layers.LIGHT, layers.DARK), strict=True):
         rgb = [[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in (shade, ground)]
-        assert shades.contrast(*rgb) >= (1.2 if number else 1.49)
+        assert layers.contrast(*rgb) >= (1.2 if number else 1.49)
 
 
 def test_a_design_of_thousands_of_boxes_stays_small():
     scene = make({"shape": "rect", "parameters": {"length_mm": 200.0, "width_mm": 60.0}}).printed
     names = [body.name for body in scene.bodies]
-    data = pages.packed(geometry.block({}, {"drawn": scene, "printed": scene}, names))
+    data = pages.packed(preview.block({}, {"drawn": scene, "printed": scene}, names))
     assert sum(len(mesh(b).triangles) for b in scene.bodies) > 90_000
     assert len(data) < 200_000

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sensorgen.export.gcode.files import Source
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.moves import NO_TOOL, Motion
 from sensorgen.export.gcode.paths import NOT_MODEL
+from sensorgen.export.gcode.reading import Source
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from sensorgen.design import design
 from sensorgen.export.gcode import paths
 from sensorgen.export.gcode.check import check
 from sensorgen.export.gcode.drags import lift
-from sensorgen.export.gcode.files import text_of
 from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.reading import text_of
 from sensorgen.export.slicing import Placed, alone, sliced
 
 DESIGNS = Path(__file__).parents[2] / "designs"

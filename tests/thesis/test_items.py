@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.core.errors import BadInput
 from sensorgen.verification.thesis import checks
 from sensorgen.verification.thesis.items import CHAPTERS, ThesisItem, chapter

@@ -27,7 +27,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design
 from sensorgen.design.printer import load_quality
 from sensorgen.design.specimen_name import QUALITIES
-from sensorgen.export.gcode.files import Source
+from sensorgen.export.gcode.reading import Source
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.entries import Reading
 from sensorgen.measure.log.importing import thesis_readings

@@ -17,7 +17,7 @@ from sensorgen.asprinted.beads import Beads
 from sensorgen.checks import estimate
 from sensorgen.core.arrays import Mask, Real
 from sensorgen.design.design import Design
-from sensorgen.export.gcode.found import GcodeFinding
+from sensorgen.export.gcode.results import GcodeFinding
 from sensorgen.scene.layers import LayerRegions, Region, drawn, narrow_mm, parts
 
 PITCH_MM = 0.1

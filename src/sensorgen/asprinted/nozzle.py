@@ -10,9 +10,9 @@ from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.crossings import CONTACT_MM, crossings
 from sensorgen.export.gcode.drags import habits, retracted
-from sensorgen.export.gcode.found import GcodeFinding
 from sensorgen.export.gcode.moves import Motion, seconds
 from sensorgen.export.gcode.paths import tools_of
+from sensorgen.export.gcode.results import GcodeFinding
 
 BALANCE_MM = 0.5  # of filament, that a travel may add to the melt in the nozzle or take
 _GAIN, _LOSS = 0.1, 0.3  # in all, of the filament of a tool's lines; a lower flow of primes alone loses a quarter

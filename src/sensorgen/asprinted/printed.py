@@ -16,7 +16,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
 from sensorgen.design.walls import WALLS
-from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.geometry import meshes
 from sensorgen.scene.layers import LayerRegions, drawn, scene_of
 from sensorgen.scene.scene import FLOATING, Body, Point, Scene, seen_from_above
 
@@ -248,4 +248,4 @@ def gap_mm(scene: Scene) -> float:
 def drawn_gap_mm(design: Design) -> float:
     """Smallest distance of the electrodes as drawn, exact [mm]."""
     scene = design.in_use
-    return round(validity.electrode_gap_mm(scene, {b.name: meshes.mesh(b) for b in scene.bodies}), 9)
+    return round(meshes.electrode_gap_mm(scene, {b.name: meshes.mesh(b) for b in scene.bodies}), 9)

@@ -13,10 +13,11 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.crossings import CONTACT_MM, PrintedLines, crossings, printed_lines
-from sensorgen.export.gcode.drags import Drags, summed
-from sensorgen.export.gcode.files import Source, text_of
+from sensorgen.export.gcode.drags import summed
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.paths import Numbering
+from sensorgen.export.gcode.reading import Source, text_of
+from sensorgen.export.gcode.results import Drags
 
 _STEP_MM = 0.01  # to which insulation is rounded
 

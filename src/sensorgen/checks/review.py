@@ -4,14 +4,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
-from sensorgen.checks import bed, estimate, rules
+from sensorgen.checks import estimate, rules
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Part, Table, comma_separated
 from sensorgen.core.findings import Finding, Verdict, counted, counts, headline, listed, table, verdict
 from sensorgen.design.design import Design
 from sensorgen.design.tower import tower
 from sensorgen.design.walls import rule
-from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.geometry import meshes
 from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import Scene
 
@@ -81,7 +81,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
     SensorgenError
         A name or value of the design is missing.
     """
-    misfit = design.waived(list(bed.check(design.printed, design.machine)))
+    misfit = design.waived(list(rules.bed_findings(design.printed, design.machine)))
     if any(not f.waiver for f in misfit):  # a sensor that no bed holds may be too large to mesh, too
         step("checks")
         return Review({}, misfit)
@@ -89,7 +89,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
     step("meshes")
     meshed = _meshes(design)
     step("checks")
-    gap_mm = validity.electrode_gap_mm(scene, meshed)
+    gap_mm = meshes.electrode_gap_mm(scene, meshed)
     findings = rules.findings(
         scene, design.machine, design.layers, gap_mm, walls or rule("prusa", design.walls), estimate.lines(design)
     ) + _crowding(design)
@@ -97,7 +97,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
     if not any(f.severity == "error" and f.rule != LOST for f in findings):
         step("validity")
         advice = "change the parameters; if they make sense, this is a fault of sensorgen: report it"
-        faults = validity.faults(scene, meshed)
+        faults = meshes.faults(scene, meshed)
         findings = [*(Finding("0-body", "error", body, what, advice) for body, what in faults), *findings]
     return Review(meshed, design.waived(findings) + design.idle_waivers(findings))
 

@@ -156,6 +156,18 @@ def findings(volumes: Iterable[LayerVolume], scene: Scene) -> list[Finding]:
     return [finding for body in scene.bodies for finding in _of_body(body, [r for r in outside if r.body == body.name])]
 
 
+def _words(here: Sequence[LayerVolume], fault: str) -> str:
+    """Fault of neighbouring layers, and how many strips vanish or fuse at most."""
+    ratios = sorted({f"{row.ratio:.2f}" for row in here})
+    words = [fault or f"prints {' to '.join(ratios[:: max(len(ratios) - 1, 1)])} times its volume"]
+    most, fused = max(here, key=lambda row: row.vanished), max(row.fused for row in here)
+    if most.vanished and not fault:
+        words.append(f"{most.vanished} of {most.strips} strips vanish")
+    if fused:
+        words.append(f"{fused} fuse")
+    return ", ".join(words)
+
+
 def _of_body(body: Body, outside: Sequence[LayerVolume]) -> Iterator[Finding]:
     """One finding for neighbouring layers with the same fault."""
     numbered = list(enumerate(outside))
@@ -163,18 +175,12 @@ def _of_body(body: Body, outside: Sequence[LayerVolume]) -> Iterator[Finding]:
         here = [row for _, row in group]
         first, last = here[0], here[-1]
         severe = fault == "is not printed at all" and not body.is_support()
-        ratios = sorted({f"{row.ratio:.2f}" for row in here})
-        what = fault or f"prints {' to '.join(ratios[:: max(len(ratios) - 1, 1)])} times its volume"
-        vanished = max(here, key=lambda row: row.vanished)
-        fused = max(row.fused for row in here)
-        more = [f"{vanished.vanished} of {vanished.strips} strips vanish"] if vanished.vanished and not fault else []
-        more += [f"{fused} fuse"] if fused else []
         yield Finding(
             "7-printed", "error" if severe else "warning", body.name,
-            f"from {first.bottom_mm:g} to {last.top_mm:g} mm it {', '.join([what, *more])}",
+            f"from {first.bottom_mm:g} to {last.top_mm:g} mm it {_words(here, fault)}",
             "make narrow parts at least a line wide, or use other walls or thinner layers",
             layer=first.layer, place_mm=(*first.place_mm, round((first.bottom_mm + first.top_mm) / 2, 9)),
-            count=max(vanished.vanished, 1), last_layer=last.layer if len(here) > 1 else None,
+            count=max(1, *(row.vanished for row in here)), last_layer=last.layer if len(here) > 1 else None,
         )  # fmt: skip
 
 

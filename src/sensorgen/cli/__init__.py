@@ -12,8 +12,8 @@ from typing import Any, NoReturn
 
 import click
 
+from sensorgen.core.display import harmless
 from sensorgen.core.errors import SensorgenError, Unprintable, nearest
-from sensorgen.core.terminal import harmless
 from sensorgen.core.version import __version__
 
 SECTIONS = {  # what each command is for, here so that --help imports none of them
@@ -65,7 +65,8 @@ _MODULES = {  # of commands, where it is not ``cli/NAME_command.py``
     "thesis": "verification.thesis_command",
     **dict.fromkeys(("check", "build", "slice"), "cli.printing"),
     **dict.fromkeys(("predict", "cell", "compress"), "cli.predictions"),
-    **dict.fromkeys(("show", "draw", "export"), "cli.views"),
+    **dict.fromkeys(("calibrate", "fit", "characterise"), "cli.fitting"),
+    **dict.fromkeys(("show", "draw", "export", "import"), "cli.views"),
     **dict.fromkeys(("array", "sheet", "stack"), "cli.studies"),
     **dict.fromkeys(("new", "pack", "list", "schema", "completion"), "cli.reference"),
 }

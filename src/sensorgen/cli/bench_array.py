@@ -16,8 +16,7 @@ from sensorgen.prediction.query import Noise
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
-    from sensorgen.measure.lab.clock import Clock
-    from sensorgen.measure.lab.devices import FrameMeter
+    from sensorgen.measure.lab.devices import Clock, FrameMeter
     from sensorgen.prediction.array.model import ArrayModel
     from sensorgen.prediction.array.readout import ArrayReadout
 
@@ -66,9 +65,8 @@ def _array(
         Show it in the browser.
     """
     from sensorgen.cli.inversion import known
-    from sensorgen.measure.lab.clock import RealClock
-    from sensorgen.measure.lab.frame_live import FrameFeed, MapView, follow
-    from sensorgen.measure.lab.frame_recorder import recorder
+    from sensorgen.measure.lab.devices import RealClock
+    from sensorgen.measure.lab.frame_live import FrameFeed, MapView, follow, recorder
     from sensorgen.prediction.array.live import LiveMaps
     from sensorgen.prediction.array.model import array_model
     from sensorgen.prediction.array.readout import ArrayReadout
@@ -130,6 +128,6 @@ def _virtual(
 ) -> "FrameMeter":  # fmt: skip
     from sensorgen.measure.lab.frame_stream import FrameStream
     from sensorgen.measure.lab.port import SimulatedPort
-    from sensorgen.measure.virtual.frame_stream import sender
+    from sensorgen.measure.virtual.array import sender
 
     return FrameStream(SimulatedPort(sender(model, how, rate_hz, faults=faults), clock), clock)

@@ -7,7 +7,7 @@ from dataclasses import Field, asdict, dataclass, fields
 from typing import Any
 
 from sensorgen import models as model_files
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design import design, packs, printer, shape_files

@@ -12,7 +12,7 @@ from sensorgen.cli import render
 from sensorgen.cli.commands import FirstWord, Work, arguments, described, ended, options_of
 from sensorgen.cli.options import DesignTip
 from sensorgen.cli.words import Length, OneOf, completed, pairs
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.options import Option

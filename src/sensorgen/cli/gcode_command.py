@@ -75,8 +75,9 @@ def _check(subject: Subject, *, materials: tuple[str, ...] = (), strict: Strict 
         What a tool prints, for mass, temperatures and melt rate; if not given, the printer's usual material, for the
         mass alone.
     """
-    from sensorgen.export.gcode.check import CheckedFile, check_motion
+    from sensorgen.export.gcode.check import check_motion
     from sensorgen.export.gcode.motion import executed
+    from sensorgen.export.gcode.results import CheckedFile
 
     drawn, machine = subject.loaded()
     named = _loaded(materials, machine.tool_numbers)

@@ -209,7 +209,7 @@ def are_files(words: Sequence[str]) -> bool:
 def calibrate(files: Sequence[str], how: ArrayOptions) -> int:
     """Calibrate the elements of an array by sessions."""
     from sensorgen.core import files as store
-    from sensorgen.measure.array_sessions import of_frames, session
+    from sensorgen.measure.array_frames import of_frames, session
     from sensorgen.prediction.array.sessions import study
 
     if how.array is None:
@@ -236,7 +236,7 @@ def invert_calibrated(calibration: str, task: Task) -> int:
 
     from sensorgen.core import files
     from sensorgen.core.document import Column, Table, comma_separated
-    from sensorgen.measure.array_sessions import session
+    from sensorgen.measure.array_frames import session
     from sensorgen.prediction.array.sessions import stored
 
     refuse_typed(_OF_DESIGNS, "has no meaning with a calibration of an array; mark unloaded frames in 'rest'")

@@ -13,7 +13,7 @@ from sensorgen.cli.commands import command as of_function
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.inversion import Task
 from sensorgen.cli.options import ArrayFrames, Law, LogFile
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.core.errors import BadInput, MissingValue, UnknownName, within
 from sensorgen.design import shapes
 

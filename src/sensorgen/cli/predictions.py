@@ -278,9 +278,9 @@ def compress_command(
     with render.pressing(asked.stress_kpa) as step:
         result: Any = compression.answer(body(design), asked, step=step)
     if plot:
-        from sensorgen.analysis.plots import compression as figures
+        from sensorgen.analysis.plots import results as figures
         from sensorgen.analysis.plots import static
         from sensorgen.core import files
 
-        files.replace(plot, static.png(figures.figure(result)))
+        files.replace(plot, static.png(figures.compression_figure(result)))
     return ended(result, before=result.explained() if explain else ())

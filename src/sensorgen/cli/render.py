@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import click
 
 from sensorgen.cli import FOUND_ERRORS
+from sensorgen.core.display import escaped, harmless
 from sensorgen.core.errors import BadInput
-from sensorgen.core.terminal import escaped, harmless
 from sensorgen.core.units import si
 
 if TYPE_CHECKING:

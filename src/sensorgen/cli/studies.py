@@ -90,9 +90,9 @@ def sheet_command(
             step=lambda name, count: step(f"{name} {count + 1}/{places}"),
         )  # fmt: skip
     if plot is not None:
-        from sensorgen.analysis.plots import sheet
+        from sensorgen.analysis.plots import results
 
-        picture = sheet.png(bounds.sheet, bounds.bounds, bounds.ports)
+        picture = results.sheet_png(bounds.sheet, bounds.bounds, bounds.ports)
         render.file(plot / f"{design.name}-sheet.png", picture, "wrote ")
     return bounds
 

@@ -14,8 +14,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from sensorgen.core import files as places
 from sensorgen.core import files as store
-from sensorgen.core import paths as places
 from sensorgen.core.errors import Unwritable
 from sensorgen.core.version import __version__
 

@@ -1,5 +1,6 @@
-"""Display of results in a notebook: by their document, or as the packages above register."""
+"""Display of results in a notebook and of strangers' text on a terminal, without characters that the terminal obeys."""
 
+import re
 from functools import singledispatch
 from html import escape
 from io import StringIO
@@ -9,6 +10,27 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from sensorgen.core.document import Part
+
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+
+
+def harmless(text: str) -> str:
+    r"""Text without these characters.
+
+    >>> harmless("a\x1b]0;title\x07b\tc\n")
+    'a]0;titleb\tc\n'
+    """
+    return _CONTROL.sub("", text)
+
+
+def escaped(text: str) -> str:
+    r"""Escape a text for JSON, where nothing of it may be lost.
+
+    >>> escaped('"a\u202eb"' + "\n")
+    '"a\\u202eb"\n'
+    """
+    return _CONTROL.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
+
 
 LINES = 20  # of a result where it is not printed on purpose
 _STYLE = (  # as that of pages, which a notebook's own colours may overlay

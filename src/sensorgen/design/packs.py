@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
-from sensorgen.core import paths, yamlfile
+from sensorgen.core import files as store
+from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.records import Strict, checked
 from sensorgen.core.version import __version__
@@ -194,13 +195,13 @@ def own() -> list[Pack]:
     except OSError:
         places = []
     packs = [Pack(path.name, "own", path) for path in map(Path, places) if NAME.fullmatch(path.name)]
-    fits = paths.data(SOURCES, "materials")
+    fits = store.data(SOURCES, "materials")
     return [*packs, Pack("fits", "own", fits, moved=(("sources", fits),))]
 
 
 def place() -> Path:
     """Folder of the user's packs: what SENSORGEN_PACKS says, or the system's place for configuration."""
-    return paths.config(PLACE, "packs")
+    return store.config(PLACE, "packs")
 
 
 def installed() -> list[Pack]:

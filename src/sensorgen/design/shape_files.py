@@ -25,9 +25,9 @@ from pydantic import ValidationError
 
 from sensorgen.core import cache as answers
 from sensorgen.core import files
+from sensorgen.core.display import harmless
 from sensorgen.core.errors import BadInput, OutOfRange, Unwritable
 from sensorgen.core.records import problem
-from sensorgen.core.terminal import harmless
 from sensorgen.design import packs, shape_process
 from sensorgen.scene.polyhedra import Loft, Polyhedron
 from sensorgen.scene.revolved import Revolved

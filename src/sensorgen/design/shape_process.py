@@ -27,9 +27,12 @@ _MODULES = (
     *LIBRARIES, "array", "bisect", "cmath", "collections", "copy", "dataclasses", "decimal", "enum", "fractions",
     "functools", "hashlib", "heapq", "itertools", "json", "math", "numbers", "numpy.fft", "numpy.polynomial",
     "numpy.random", "operator", "random", "re", "statistics", "string", "struct", "textwrap", "time", "typing",
-    "sensorgen.scene.array", "sensorgen.scene.layers", "sensorgen.scene.polyhedra", "sensorgen.scene.revolved",
-    "sensorgen.scene.triangles", "sensorgen.scene.sections", "sensorgen.scene.strips",
+    "sensorgen.scene.layers", "sensorgen.scene.patterns", "sensorgen.scene.polyhedra", "sensorgen.scene.revolved",
+    "sensorgen.scene.sections",
 )  # fmt: skip
+_EARLIER = {  # names of a module in files that were written before
+    f"sensorgen.scene.{name}": "sensorgen.scene.patterns" for name in ("array", "strips", "triangles")
+}
 
 
 class TooLong(BaseException):
@@ -116,10 +119,10 @@ def _import(text: str, libraries: list[str]) -> None:
     import_module("sensorgen.core.confine")
     sys.path += libraries
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # a thread that exists already would not be confined
-    for name in _MODULES:
+    for name, module in (dict(zip(_MODULES, _MODULES, strict=True)) | _EARLIER).items():
         if all(re.search(rf"\b{part}\b", text) for part in name.split(".")):  # also as np.random
             with suppress(ImportError):  # the file's own import says so
-                import_module(name)
+                sys.modules[name] = import_module(module)
     os.environ.clear()
     sys.path.clear()
 

@@ -15,14 +15,14 @@ from sensorgen.design.design import Design
 from sensorgen.design.tower import tower
 from sensorgen.export import threemf
 from sensorgen.export.gcode.drags import Lifted, lift
-from sensorgen.export.gcode.files import text_of
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.paths import Paths, paths_of
+from sensorgen.export.gcode.reading import text_of
 from sensorgen.export.gcode.ready import ready
-from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, curaengine, prusa, stl, versions
+from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, curaengine, prusa, run, versions
 from sensorgen.export.slicers.loads import ToolLoad, loads
 from sensorgen.export.slicers.run import Runner, find
-from sensorgen.export.threemf.part import part_of, parts_of
+from sensorgen.export.threemf.core import part_of, parts_of
 from sensorgen.scene.geometry import meshes
 from sensorgen.scene.scene import Body
 
@@ -270,7 +270,7 @@ def _run(
         shift_mm = np.array([-c for c in design.machine.bed_centre_mm()] + [0.0])
         files = [(folder / f"{part.name}.stl", part) for part in bodies]
         for path, part in files:
-            path.write_bytes(stl.content(part.mesh, shift_mm))
+            path.write_bytes(run.content(part.mesh, shift_mm))
         before = time.perf_counter()
         curaengine.slice_bodies([(path, part.extruder) for path, part in files], settings, raw, runner)
         seconds, not_known = time.perf_counter() - before, curaengine.unknown(settings, program)

@@ -295,6 +295,13 @@ def listed(names: Sequence[str]) -> str:
     return (", ".join(names[:8]) or "none") + (", ..." if len(names) > 8 else "")
 
 
+def _with_point(text: str) -> str:
+    """Number with a decimal point in place of its comma."""
+    if "," in text and "." in text:
+        raise BadInput(f"{text[:60]!r} has a point and a comma; write numbers as 1234.5 or 1234,5")
+    return text.replace(",", ".")
+
+
 def number(text: str, *, decimal_comma: bool = False, date: bool = False) -> float:
     """Number in a cell; nan where it is empty.
 
@@ -308,11 +315,7 @@ def number(text: str, *, decimal_comma: bool = False, date: bool = False) -> flo
     >>> number("1,5", decimal_comma=True), number("1970-01-01T00:01:00Z", date=True), number(" ")
     (1.5, 60.0, nan)
     """
-    stripped = text.strip()
-    if decimal_comma:
-        if "," in stripped and "." in stripped:
-            raise BadInput(f"{text[:60]!r} has a point and a comma; write numbers as 1234.5 or 1234,5")
-        stripped = stripped.replace(",", ".")
+    stripped = (_with_point(text) if decimal_comma else text).strip()
     value: float | None
     try:
         value = float(stripped) if stripped else np.nan

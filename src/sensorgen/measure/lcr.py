@@ -250,12 +250,14 @@ def _with_units(lines: Sequence[str], header: _Header) -> tuple[tuple[_Column, .
     cells = _cells(lines[below], header.separator) if below < len(lines) else []
     if not any(cells) or any(_NUMBER.match(cell) for cell in cells) or len(cells) > len(header.heads):
         return header.columns, below
-    columns = []
-    for column in header.columns:
-        unit = cells[column.at].strip("[]() -") if column.at < len(cells) else ""
-        scale = float(immittance.factor(column.quantity, unit)) if unit else column.scale
-        columns.append(_Column(column.at, column.quantity, scale, column.head))
-    return tuple(columns), below + 1
+    return tuple(_with_unit(column, cells) for column in header.columns), below + 1
+
+
+def _with_unit(column: _Column, cells: Sequence[str]) -> _Column:
+    """A column in the unit that its cell of the row of units states, if it does."""
+    unit = cells[column.at].strip("[]() -") if column.at < len(cells) else ""
+    scale = float(immittance.factor(column.quantity, unit)) if unit else column.scale
+    return _Column(column.at, column.quantity, scale, column.head)
 
 
 def _values(cells: Sequence[str], columns: Sequence[_Column], path: Path, number: int) -> _Row:

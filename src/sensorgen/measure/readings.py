@@ -80,9 +80,9 @@ class Readings:
                 raise table.error(1, f"{names.count(name)} columns are {name}; expected one")
         with within(f"{table.name}, row 1"):
             self._re, self._im = _impedance_columns(names)
-        others = [at for at in range(len(names)) if at not in {*self._re.values(), *self._im.values()}]
-        self._beside = [at for at in others if names[at] in beside]
-        self._others = [at for at in others if names[at] not in beside]
+        self._beside, self._others = list[int](), list[int]()
+        for at in sorted(set(range(len(names))) - {*self._re.values(), *self._im.values()}):
+            (self._beside if names[at] in beside else self._others).append(at)
         self.frequency_hz = np.array(list(self._re))
         self.kept = [names[at] for at in self._others]
         self.numbers = [names[at] for at in self._beside]

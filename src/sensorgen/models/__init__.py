@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Protocol, cast
 
-from sensorgen.core import plugins
+from sensorgen.core import lazy
 from sensorgen.core.bounds import Interval
 from sensorgen.scene.scene import Scene
 
@@ -67,10 +67,10 @@ class CapacitanceModel(Protocol):
 
 def names() -> tuple[str, ...]:
     """Names of all models."""
-    return plugins.stating(sys.modules[__name__], "SOURCE = ")
+    return lazy.stating(sys.modules[__name__], "SOURCE = ")
 
 
 def capacitance_models() -> dict[str, CapacitanceModel]:
     """The models of capacitance by name, loaded."""
-    names_of_models = plugins.stating(sys.modules[__name__], "def capacitance(")
+    names_of_models = lazy.stating(sys.modules[__name__], "def capacitance(")
     return {name: cast(CapacitanceModel, import_module(f"{__name__}.{name}")) for name in names_of_models}

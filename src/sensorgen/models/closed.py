@@ -6,7 +6,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
-from sensorgen.scene.overlay import parts
+from sensorgen.scene.layers import overlay_parts
 from sensorgen.scene.scene import Scene
 
 SOURCE = "Dirichlet's principle on a cell without air; neo-Hookean compression of one free column"
@@ -66,7 +66,7 @@ def most_f_per_m2(
 def _columns(scene: Scene) -> tuple[Real, Real, Real]:
     """Distance of the electrodes and film between them [m], and width, at places in all columns with both."""
     rows = []
-    for part in parts(scene):
+    for part in overlay_parts(scene):
         for column in part.columns:
             ends = [layer.body.terminal for layer in column.layers]
             if not {"top", "bottom"} <= {*ends}:

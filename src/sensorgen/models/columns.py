@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
-from sensorgen.scene.overlay import OverlayPart, parts
+from sensorgen.scene.layers import OverlayPart, overlay_parts
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import ROUNDING_MM, Layer, SectionColumn, sections
 from sensorgen.solvers.electrostatics.bounds import third_conductor
@@ -37,7 +37,7 @@ def why_not_applicable(scene: Scene) -> str | None:
     if reason := third_conductor(scene):
         return reason
     try:
-        gaps = [_gap(column) for part in parts(scene) for column in _distinct(part).values()]
+        gaps = [_gap(column) for part in overlay_parts(scene) for column in _distinct(part).values()]
     except ValueError as error:
         return str(error)
     if any(gap is None for gap in gaps):
@@ -84,7 +84,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     ArithmeticError
         The bounds have crossed, which no geometry can make them do.
     """
-    rows = [_Row.of(part, permittivity) for part in parts(scene)]
+    rows = [_Row.of(part, permittivity) for part in overlay_parts(scene)]
     lower = sum(row.total(_Stack.upright) for row in rows)
     tries = [_level(rows)]
     smooth = len(rows) == 1 and rows[0].is_smooth()
@@ -100,7 +100,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 
 
 def _is_one_section(scene: Scene) -> bool:
-    sections_of = parts(scene)
+    sections_of = overlay_parts(scene)
     return len(sections_of) == 1 and not sections_of[0].in_plan
 
 

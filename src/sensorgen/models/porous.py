@@ -8,7 +8,7 @@ import numpy as np
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
-from sensorgen.scene.overlay import parts
+from sensorgen.scene.layers import overlay_parts
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import Layer, SectionColumn
 
@@ -155,7 +155,7 @@ def filling(scene: Scene, modulus_pa: Mapping[str, float]) -> Filling | None:
         Young's modulus by material [Pa].
     """
     try:
-        columns = [(part.depth_mm * (c.right_mm - c.left_mm), c) for part in parts(scene) for c in part.columns]
+        columns = [(part.depth_mm * (c.right_mm - c.left_mm), c) for part in overlay_parts(scene) for c in part.columns]
     except ValueError:
         return None
     area = np.array([a for a, _ in columns]) / sum(a for a, _ in columns)

@@ -10,7 +10,7 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.units import M_PER_MM
-from sensorgen.scene.overlay import parts
+from sensorgen.scene.layers import overlay_parts
 from sensorgen.scene.scene import Scene
 
 SOURCE = "Hooke's law, column by column; plane strain, E / (1 - nu^2)"
@@ -55,7 +55,7 @@ def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Seq
     # Gap [mm], compliance t / M [mm/Pa], width [mm] and thickness [mm] at places in all columns
     share, rows = _PLACES, []
     try:
-        sections_of = parts(scene)
+        sections_of = overlay_parts(scene)
     except ValueError as error:
         raise BadInput(f"no springs of columns: {error}") from None
     for part in sections_of:

@@ -58,7 +58,7 @@ def _parts(design: Design) -> "list[tuple[Scene, float]]":
 
     Other patterns are whole: models of prisms find the cell, and what the sensor's ends cut off.
     """
-    from sensorgen.scene.array import ArrayParams
+    from sensorgen.scene.patterns import ArrayParams
 
     scene, params = design.in_use, design.params
     if not isinstance(params, ArrayParams) or all(isinstance(p, Prism) for b in scene.bodies for p in b.pieces):

@@ -15,8 +15,7 @@ from sensorgen.checks.volumes import LayerVolume
 from sensorgen.core.findings import Finding
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
-from sensorgen.export.gcode.check import Checked
-from sensorgen.export.gcode.drags import Lifting
+from sensorgen.export.gcode.results import Checked, Lifting
 from sensorgen.export.slicers import TIME_LIMIT_S, TITLES
 
 if TYPE_CHECKING:

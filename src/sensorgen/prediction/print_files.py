@@ -123,9 +123,9 @@ def at_hand(
 
 def _fits(design: Design) -> bool:
     """Test whether a design fits the bed, or a waiver says so."""
-    from sensorgen.checks import bed
+    from sensorgen.checks import rules
 
-    return all(f.waiver for f in design.waived(list(bed.check(design.printed, design.machine))))
+    return all(f.waiver for f in design.waived(list(rules.bed_findings(design.printed, design.machine))))
 
 
 def _sliced(design: Design, slicer: str, program: str, question: dict[str, Any], step: Step) -> PrintFile:

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from sensorgen.asprinted import printed as asprinted
-from sensorgen.checks import support
+from sensorgen.checks import bridges
 from sensorgen.checks.review import LOST, Review, Step, advised, review
 from sensorgen.core.errors import MissingValue
 from sensorgen.core.findings import Finding, grouped
@@ -113,7 +113,7 @@ def combined(
         The print's G-code.
     """
     own = of_own_machine(design)
-    replaced = (IDLE,) if source.startswith("estimated") else (IDLE, LOST, support.RULE)
+    replaced = (IDLE,) if source.startswith("estimated") else (IDLE, LOST, bridges.RULE)
     names = [parameter.name for parameter in fields(design.params)]
     try:
         permittivities(design), resistivities(design)

@@ -1,8 +1,10 @@
 """Bodies with flat faces: closed triangle meshes, and lofts between outlines at two heights."""
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 from math import hypot, inf, isfinite
 
 from sensorgen.core.errors import BadInput
@@ -56,20 +58,21 @@ class Polyhedron:
             object.__setattr__(self, "triangles", tuple((a, c, b) for a, b, c in self.triangles))
 
     def _fault(self) -> str:
-        if not all(isfinite(value) for vertex in self.vertices for value in vertex):
+        if not all(map(isfinite, chain.from_iterable(self.vertices))):
             return "has a corner that is nowhere"
-        if not all(0 <= number < len(self.vertices) for triangle in self.triangles for number in triangle):
+        if not all(0 <= number < len(self.vertices) for number in chain.from_iterable(self.triangles)):
             return "refers to a vertex that it does not have"
-        edges: dict[tuple[int, int], int] = {}
-        for triangle in self.triangles:
-            for k in range(3):
-                edge = (triangle[k - 1], triangle[k])
-                edges[edge] = edges.get(edge, 0) + 1
-        for (a, b), count in edges.items():
-            if count > 1 or edges.get((b, a), 0) != 1 or a == b:
-                place = ", ".join(f"{value:.6g}" for value in self.vertices[a])
-                return f"is open, or not oriented, at the edge from ({place}) mm"
+        start = self._open_edge()
+        if start is not None:
+            place = ", ".join(f"{value:.6g}" for value in self.vertices[start])
+            return f"is open, or not oriented, at the edge from ({place}) mm"
         return "encloses nothing" if not self.triangles or abs(self.volume_mm3()) < SLIVER_MM**3 else ""
+
+    def _open_edge(self) -> int | None:
+        """Vertex at which an edge begins that is not once in each direction; None of a closed, oriented surface."""
+        edges = Counter((triangle[k - 1], triangle[k]) for triangle in self.triangles for k in range(3))
+        wrong = (a for (a, b), count in edges.items() if count > 1 or edges[b, a] != 1 or a == b)
+        return next(wrong, None)
 
     def span(self, axis: str) -> Point:
         """Lowest and highest coordinate along an axis [mm]."""
@@ -111,15 +114,7 @@ class Polyhedron:
         """Outlines in which the plane ``axis = at_mm`` cuts it, in ``PLANE[axis]`` [mm]; those with holes in parts."""
         across = AXES.index(axis)
         first, second = (AXES.index(other) for other in PLANE[axis])
-        below = [vertex[across] <= at_mm for vertex in self.vertices]
-        after: dict[tuple[int, int], tuple[int, int]] = {}
-        for triangle in self.triangles:
-            sides = [(triangle[k - 1], triangle[k]) for k in range(3)]
-            up = next((s for s in sides if below[s[0]] and not below[s[1]]), None)
-            if up:
-                down = next((b, a) for a, b in sides if below[b] and not below[a])
-                # (x, z) is left-handed: seen against y, triangles run the other way round
-                after[up if axis == "y" else down] = down if axis == "y" else up
+        after = self._crossed([vertex[across] <= at_mm for vertex in self.vertices], axis)
 
         def crossing(edge: tuple[int, int]) -> Point:
             a, b = (self.vertices[number] for number in edge)
@@ -130,6 +125,18 @@ class Polyhedron:
 
         loops = [without_straight([crossing(edge) for edge in ring]) for ring in _rings(after)]
         return _without_holes([loop for loop in loops if len(loop) > 2 and abs(area_mm2(loop)) > SLIVER_MM**2])
+
+    def _crossed(self, below: list[bool], axis: str) -> dict[tuple[int, int], tuple[int, int]]:
+        """Edges that a plane crosses, each with the next one, by the vertices that lie below it."""
+        after: dict[tuple[int, int], tuple[int, int]] = {}
+        for triangle in self.triangles:
+            sides = [(triangle[k - 1], triangle[k]) for k in range(3)]
+            up = next((s for s in sides if below[s[0]] and not below[s[1]]), None)
+            if up:
+                down = next((b, a) for a, b in sides if below[b] and not below[a])
+                # (x, z) is left-handed: seen against y, triangles run the other way round
+                after[up if axis == "y" else down] = down if axis == "y" else up
+        return after
 
     def moved(self, move: Move) -> "Polyhedron":
         """It at another place, scaled or turned."""
@@ -202,19 +209,21 @@ class Loft:
             return "has a corner that is nowhere"
         if self.top_mm - self.bottom_mm < SLIVER_MM:
             return f"from {self.bottom_mm:g} to {self.top_mm:g} mm has no height"
-        areas = [area_mm2(outline) for outline in (self.lower, self.upper)]
+        areas = area_mm2(self.lower), area_mm2(self.upper)
         if max(map(abs, areas)) < SLIVER_MM**2:
             return "encloses nothing"
         if min(areas) < -(SLIVER_MM**2) and max(areas) > SLIVER_MM**2:
             return "is twisted: its outlines run in different senses"
-        for k in range(len(self.lower)):
-            (a, b), (c, d) = (self.lower[k - 1], self.lower[k]), (self.upper[k - 1], self.upper[k])
-            below, above = ((q[0] - p[0], q[1] - p[1]) for p, q in ((a, b), (c, d)))
-            cross = below[0] * above[1] - below[1] * above[0]
-            if abs(cross) > SLIVER_MM * max(hypot(*below), hypot(*above)):
-                return f"has a flank that is not flat, from ({a[0]:.6g}, {a[1]:.6g}) to ({b[0]:.6g}, {b[1]:.6g})"
-            if below[0] * above[0] + below[1] * above[1] < -(SLIVER_MM**2):
-                return f"has a flank that crosses itself, from ({a[0]:.6g}, {a[1]:.6g}) to ({b[0]:.6g}, {b[1]:.6g})"
+        return next(filter(None, map(self._fault_of_flank, range(len(self.lower)))), "")
+
+    def _fault_of_flank(self, k: int) -> str:
+        (a, b), (c, d) = (self.lower[k - 1], self.lower[k]), (self.upper[k - 1], self.upper[k])
+        below, above = ((q[0] - p[0], q[1] - p[1]) for p, q in ((a, b), (c, d)))
+        cross = below[0] * above[1] - below[1] * above[0]
+        if abs(cross) > SLIVER_MM * max(hypot(*below), hypot(*above)):
+            return f"has a flank that is not flat, from ({a[0]:.6g}, {a[1]:.6g}) to ({b[0]:.6g}, {b[1]:.6g})"
+        if below[0] * above[0] + below[1] * above[1] < -(SLIVER_MM**2):
+            return f"has a flank that crosses itself, from ({a[0]:.6g}, {a[1]:.6g}) to ({b[0]:.6g}, {b[1]:.6g})"
         return ""
 
     def span(self, axis: str) -> Point:

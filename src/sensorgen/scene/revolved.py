@@ -137,22 +137,23 @@ class Revolved:
         """Refuse profiles that no body can have, and turn those that run clockwise."""
         bulges = self.bulges or (0.0,) * len(self.outline)
         object.__setattr__(self, "bulges", bulges)
-        reason = ""
-        if len(bulges) != len(self.outline):
-            reason = f"has {len(bulges)} bulges; expected one for each of its {len(self.outline)} corners"
-        elif not all(abs(bulge) <= 1 for bulge in bulges):
-            reason = "has a bulge that is no number from -1 to 1; expected two arcs in place of more than half a circle"
-        elif not (isfinite(self.x_mm) and isfinite(self.y_mm)):
-            reason = "turns about an axis that is nowhere"
-        else:
-            reason = fault(self.outline, self._area_mm2())
-        if not reason and (low := min(r for e in self._edges() for r, _ in (e.start, e.end))) < 0:
-            reason = f"lies beyond the axis that it turns about, at a radius of {low:.6g} mm"
-        if reason:
+        if reason := self._fault(bulges):
             raise BadInput(f"a profile of revolution {reason}: {described(self.outline)}")
         if self._area_mm2() < 0:
             object.__setattr__(self, "outline", self.outline[::-1])
             object.__setattr__(self, "bulges", tuple(-bulge for bulge in (*bulges[-2::-1], bulges[-1])))
+
+    def _fault(self, bulges: tuple[float, ...]) -> str:
+        if len(bulges) != len(self.outline):
+            return f"has {len(bulges)} bulges; expected one for each of its {len(self.outline)} corners"
+        if not all(abs(bulge) <= 1 for bulge in bulges):
+            return "has a bulge that is no number from -1 to 1; expected two arcs in place of more than half a circle"
+        if not (isfinite(self.x_mm) and isfinite(self.y_mm)):
+            return "turns about an axis that is nowhere"
+        if reason := fault(self.outline, self._area_mm2()):
+            return reason
+        low = min(r for edge in self._edges() for r, _ in (edge.start, edge.end))
+        return f"lies beyond the axis that it turns about, at a radius of {low:.6g} mm" if low < 0 else ""
 
     def span(self, axis: str) -> Point:
         """Lowest and highest coordinate along an axis [mm]."""

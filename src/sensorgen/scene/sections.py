@@ -63,14 +63,20 @@ def _is_constant(scene: Scene, normal: str) -> bool:
     return all(p.is_constant(normal) for b in scene.bodies for p in b.pieces)
 
 
+def _through(cuts: list[float], spans: list[tuple[float, float]]) -> list[list[int]]:
+    """Numbers of the spans that go through each interval between cuts."""
+    inside: list[list[int]] = [[] for _ in cuts[1:]]
+    for index, (low, high) in enumerate(spans):
+        for k in range(bisect_left(cuts, low), bisect_left(cuts, high)):
+            inside[k].append(index)
+    return inside
+
+
 def _sections(scene: Scene, normal: str) -> list[Section]:
     across = "x" if normal == "y" else "y"
     spans = [(p.span(normal), body, p) for body in scene.bodies for p in body.pieces]
     cuts = sorted({edge for span, _, _ in spans for edge in span})
-    slabs: list[list[int]] = [[] for _ in cuts[1:]]
-    for index, ((low, high), _, _) in enumerate(spans):
-        for k in range(bisect_left(cuts, low), bisect_left(cuts, high)):
-            slabs[k].append(index)
+    slabs = _through(cuts, [span for span, _, _ in spans])
     looks: dict[object, int] = {}
     look = [looks.setdefault((body.name, shadow(p, normal)), len(looks)) for _, body, p in spans]
     by_look: dict[tuple[int, ...], tuple[float, float, list[int]]] = {}

@@ -172,7 +172,11 @@ def _slice(column: SectionColumn, height_mm: float, layered: bool) -> Slice:
         )
         at = layer.top_mm
     bands.append(Band("air", "", at, (height_mm, height_mm)))
-    # Bands without those of no height, and neighbours of one material as one
+    return Slice(column.left_mm, column.right_mm, _joined(bands, layered))
+
+
+def _joined(bands: Sequence[Band], layered: bool) -> tuple[Band, ...]:
+    """Bands without those of no height, and neighbours of one material as one, unless ``layered``."""
     joined: list[Band] = []
     for band in bands:
         if max(t - b for b, t in zip(band.bottom_mm, band.top_mm, strict=True)) <= ROUNDING_MM:
@@ -180,7 +184,7 @@ def _slice(column: SectionColumn, height_mm: float, layered: bool) -> Slice:
         if joined and joined[-1].is_same(band) and not layered:
             band = Band(band.material, band.terminal, joined.pop().bottom_mm, band.top_mm)
         joined.append(band)
-    return Slice(column.left_mm, column.right_mm, tuple(joined))
+    return tuple(joined)
 
 
 def _bridged(last: Slice, here: Slice) -> tuple[Band, ...]:

@@ -10,9 +10,9 @@ from sensorgen.cli import render
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import arguments, options_of
 from sensorgen.cli.designs import DesignGroup
+from sensorgen.core.display import escaped
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.options import Option
-from sensorgen.core.terminal import escaped
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
@@ -43,7 +43,7 @@ def _of_design(
     output, --output, -o : DIR
         Folder of the files.
     """
-    from sensorgen.analysis.plots.libraries import needed
+    from sensorgen.analysis.plots.figure import needed
     from sensorgen.core import files as store
     from sensorgen.core.document import to_json
     from sensorgen.prediction.query import Query
@@ -91,7 +91,7 @@ def _of_scenes(
     import csv
     import io
 
-    from sensorgen.analysis.plots.libraries import needed
+    from sensorgen.analysis.plots.figure import needed
     from sensorgen.core import files as store
     from sensorgen.verification import chart
     from sensorgen.verification.chart import plot

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from sensorgen.core import files, yamledit, yamlfile
+from sensorgen.core import files, yamlfile
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design, load, make
 from sensorgen.workflows.changes import TriedChange
@@ -29,7 +29,7 @@ def apply(path: Path, design: Design, change: TriedChange) -> None:
         raise BadInput(f"--apply: options change {path} too; expected the file alone: write them into it first")
     text = yamlfile.text(path)
     values = {tuple(one.key.split(".")): one.after for one in change.changes}
-    edited = yamledit.changed(text, values, str(path))
+    edited = yamlfile.changed(text, values, str(path))
     if make({"name": path.stem} | yamlfile.parse(edited, str(path)), str(path)).id() != change.trial.design:
         raise BadInput(f"--apply: {path} would not become the design that was tried: edit it by hand")
     start = b"\xef\xbb\xbf" if path.read_bytes().startswith(b"\xef\xbb\xbf") else b""

@@ -26,7 +26,7 @@ from sensorgen.export import threemf
 from sensorgen.export.slicers import cura, orca, prusa
 from sensorgen.export.slicers.loads import loads
 from sensorgen.export.slicers.versions import folders
-from sensorgen.export.threemf.part import parts_of
+from sensorgen.export.threemf.core import parts_of
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless, to_json

@@ -20,7 +20,7 @@ from sensorgen.design.packs import File, Kind, Pack
 from sensorgen.export import machine
 from sensorgen.export.slicers.loads import ToolLoad
 from sensorgen.measure import accuracy
-from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.geometry import meshes
 from sensorgen.scene.scene import Envelope, Fill, Scene
 
 _SMALL = {"length_mm": 12.0, "width_mm": 5.0}  # of a test's sensor, where the shape's ranges hold it
@@ -352,7 +352,7 @@ def _scene_faults(scene: Scene, fill: Fill) -> Faults:
     if terminals not in (["bottom", "top"], ["bottom", "middle", "top"]):
         yield "terminals", f"terminals are {terminals}", "give one body 'top', and one 'bottom'"
     by_body = {body.name: meshes.mesh(body) for body in scene.bodies}
-    for body, fault in validity.faults(scene, by_body):
+    for body, fault in meshes.faults(scene, by_body):
         yield "scene", f"{body}: {fault}", advice
     volume, box = sum(body.volume_mm3() for body in scene.bodies), math.prod(scene.size_mm)
     is_round = any(piece.is_round() for body in scene.bodies for piece in body.pieces)

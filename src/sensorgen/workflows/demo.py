@@ -193,7 +193,7 @@ def _found(work: "CalibrationWork", truth: Mapping[str, float]) -> Iterator[Demo
 
 def _inverted(log: "Log", work: "CalibrationWork", number: int) -> Inverted:
     """Presses of a recording by a calibration that did not know them."""
-    from sensorgen.analysis.calibration.pairs import known_presses
+    from sensorgen.analysis.calibration.readings import known_presses
     from sensorgen.prediction.calibration.calibration import coverage_of
 
     name = work.calibration.specimen

@@ -45,9 +45,9 @@ def _(of: Sweep[Any]) -> "Figure":
 
 @display.figure.register(CompressionResult)
 def _(of: CompressionResult) -> "Figure":
-    from sensorgen.analysis.plots import compression, static
+    from sensorgen.analysis.plots import results, static
 
-    return static.whole(compression.figure(of))
+    return static.whole(results.compression_figure(of))
 
 
 @display.figure.register(Loaded)

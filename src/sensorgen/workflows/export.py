@@ -10,7 +10,7 @@ import numpy as np
 from sensorgen.asprinted.printed import Printed
 from sensorgen.core import files as store
 from sensorgen.core.errors import BadInput
-from sensorgen.scene.geometry.layered import closed
+from sensorgen.export.layered import closed
 from sensorgen.scene.geometry.meshes import Mesh
 
 KINDS = (".3mf", ".stl", ".vtu", ".step")
@@ -66,18 +66,18 @@ def _closed(printed: Printed, groups: Mapping[str, Sequence[str]]) -> dict[str, 
 
 
 def _stl(printed: Printed, path: Path) -> dict[Path, bytes]:
-    from sensorgen.export.slicers import stl
+    from sensorgen.export.slicers import run
 
     bodies = printed.design.printed.bodies
     groups = {"": [body.name for body in bodies]}
     groups |= {f"-{m}": [body.name for body in bodies if body.material == m] for m in {b.material for b in bodies}}
     meshes = _closed(printed, groups)
-    return {path.with_stem(path.stem + name): stl.content(meshes[name], np.zeros(3)) for name in sorted(meshes)}
+    return {path.with_stem(path.stem + name): run.content(meshes[name], np.zeros(3)) for name in sorted(meshes)}
 
 
 def _3mf(printed: Printed) -> bytes:
     from sensorgen.export import threemf
-    from sensorgen.export.threemf.part import part_of
+    from sensorgen.export.threemf.core import part_of
 
     design = printed.design
     material = {body.name: body.material for body in design.printed.bodies}
@@ -88,14 +88,14 @@ def _3mf(printed: Printed) -> bytes:
 
 def _vtu(printed: Printed, voxel_mm: float | None) -> bytes:
     from sensorgen.design.values import permittivities
-    from sensorgen.export import vtu
-    from sensorgen.scene.geometry.layered import voxels
+    from sensorgen.export import layered
+    from sensorgen.export.layered import voxels
 
     design, bodies = printed.design, printed.design.printed.bodies
     known = {value.material: value.value for value in permittivities(design)}
     pitch_mm = design.layers.layer_mm / 2 if voxel_mm is None else voxel_mm
     grid = voxels(printed.first, [body.name for body in bodies], design.printed.size_mm, pitch_mm)
-    return vtu.content(grid, bodies, known)
+    return layered.content(grid, bodies, known)
 
 
 def _step(printed: Printed) -> bytes:

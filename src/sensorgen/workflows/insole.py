@@ -155,8 +155,7 @@ def _run(
     """One design through the whole chain."""
     from sensorgen.checks.review import review
     from sensorgen.design.design import load
-    from sensorgen.measure.array_frames import read
-    from sensorgen.measure.array_sessions import of_frames
+    from sensorgen.measure.array_frames import of_frames, read
     from sensorgen.measure.virtual.array import printed, walked
     from sensorgen.prediction.array.frames import inverted
     from sensorgen.prediction.array.model import array_model

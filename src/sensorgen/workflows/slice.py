@@ -14,7 +14,7 @@ from sensorgen.core.errors import Unprintable
 from sensorgen.core.findings import Finding, Verdict, headline, listed
 from sensorgen.design.design import Design
 from sensorgen.design.walls import rule
-from sensorgen.export.gcode.report import FileNeeds
+from sensorgen.export.gcode.results import FileNeeds
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step
 from sensorgen.prediction.new_slice import SliceReport, slice_now

@@ -15,7 +15,7 @@ from itertools import pairwise, product
 from math import prod
 from typing import Annotated, Any, cast
 
-from sensorgen.checks.slices import TOUCH_MM
+from sensorgen.checks.widths import TOUCH_MM
 from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.design.arrays import ArrayLayout, Params, layout

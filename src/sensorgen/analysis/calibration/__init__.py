@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sensorgen.analysis.calibration.meters import readings_of
-from sensorgen.analysis.calibration.pairs import known_presses, nothing_recorded
+from sensorgen.analysis.calibration.readings import known_presses, nothing_recorded, readings_of
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput, MissingValue, within

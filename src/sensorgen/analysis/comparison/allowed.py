@@ -1,7 +1,7 @@
 r"""Resistivity that a multimeter's reading allows.
 
 An electrode's resistance over its resistivity is known between bounds, and R_Z says how far the other electrode carries
-current through the film (:mod:`sensorgen.measure.signal.leakage`). The log does not say which electrode was read: each
+current through the film (:mod:`sensorgen.measure.signal.verdicts`). The log does not say which electrode was read: each
 reading allows a range of :math:`\varrho`.
 """
 
@@ -14,7 +14,7 @@ from sensorgen.core.bounds import Bounds
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.values import resistivities
-from sensorgen.measure.signal.leakage import electrode_and_leak
+from sensorgen.measure.signal.verdicts import electrode_and_leak
 from sensorgen.prediction.rest_state import electrode_resistance
 
 

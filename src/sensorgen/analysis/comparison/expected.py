@@ -1,22 +1,33 @@
-"""Expected readings of a design: the earliest prediction in the log, else one that is made now and named so."""
+"""Expected readings of a design: the earliest prediction in the log, else one that is made now and named so.
+
+:class:`Movable` moves one parameter of a prediction: what fits and explanations are made of.
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import inf, isnan
 from statistics import fmean, geometric_mean
+
+import numpy as np
 
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.core.version import __version__
 from sensorgen.design.body import Body
+from sensorgen.design.design import make
 from sensorgen.measure.log import Entry, Log, Withdrawal
 from sensorgen.measure.log import Prediction as Stored
-from sensorgen.measure.signal.leakage import along_ohm, leak_s
+from sensorgen.measure.recording.samples import Complex, Real
+from sensorgen.measure.signal.verdicts import along_ohm, leak_s
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.quantities import impedance_at
-from sensorgen.prediction.rest_state import NOTHING_LOST, Lost, lost
+from sensorgen.prediction.rest_state import NOTHING_LOST, Lost, lost, rest_state
 from sensorgen.prediction.results import Prediction, from_json
+from sensorgen.prediction.sensor_model import SensorModel
 
 _MOST_FILMS = 1 << 14  # readings across films, of one design, that are kept with what they predict
 
@@ -186,3 +197,85 @@ def _losses(body: Body) -> Lost:
         return lost(body.design)
     except SensorgenError:
         return Lost()
+
+
+PERMITTIVITY = "relative_permittivity"
+FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)  # of permittivity or film at which the capacitance is worked out
+
+
+@dataclass(frozen=True, eq=False)
+class Movable:
+    """A body's sensor that parameters can be moved of.
+
+    Attributes
+    ----------
+    body : Body
+        That was measured.
+    """
+
+    body: Body
+
+    @cached_property
+    def model(self) -> SensorModel:
+        """As predicted; raises as :func:`sensorgen.prediction.planning.sensor_model`."""
+        return sensor_model(self.body)[0]
+
+    @property
+    def film(self) -> str:
+        """Name of the film's material."""
+        return self.body.design.slot("film")[0].name
+
+    @cached_property
+    def permittivity(self) -> float:
+        """Of the film, as predicted [-]."""
+        return next(t.value for t in self.model.rest.values if t.material == self.film)
+
+    def capacitance_f(self, permittivity: float) -> float:
+        """With another permittivity of the film's material [F]."""
+        changed = self.body.with_values({self.film: {PERMITTIVITY: permittivity}})
+        return rest_state(changed, ranges=False).capacitance.value
+
+    @cached_property
+    def by_permittivity(self) -> tuple[Real, Real]:
+        """Ln of the capacitance's middle, relative to the predicted one, over ln of the permittivity's factor."""
+        return _curve(lambda factor: self.capacitance_f(self.permittivity * factor), self.model.rest.capacitance.value)
+
+    @cached_property
+    def by_film(self) -> tuple[Real, Real]:
+        """Slopes over ln of the film's factor, of the drawing; flat where a design has no film.
+
+        A print has whole layers, so that its capacitance jumps with the film that is asked for.
+        """
+        data = self.body.design.model_dump(exclude={"name"}, exclude_defaults=True, mode="json")
+        if not (d := getattr(self.body.design.params, "dielectric_mm", 0.0)):
+            return np.log(FACTORS), np.zeros(len(FACTORS))
+
+        def at(factor: float) -> float:
+            changed = make(data | {"parameters": data.get("parameters", {}) | {"dielectric_mm": d * factor}})
+            return rest_state(bodies.drawn(changed), ranges=False).capacitance.value
+
+        return _curve(at, at(1.0))
+
+
+def _curve(at: Callable[[float], float], known: float) -> tuple[Real, Real]:
+    return np.log(FACTORS), np.log([at(k) / known if k != 1 else 1.0 for k in FACTORS])
+
+
+def moved(sensor: Sensor, resistivity: float = 1.0, capacitance: float = 1.0, leak_s: float = 0.0) -> Sensor:
+    """A sensor with resistivities and capacitance times a factor [-], and a leak of the whole film [S]."""
+    top, bottom = sensor.resistivity_ohm_m
+    return replace(
+        sensor, resistivity_ohm_m=(top * resistivity, bottom * resistivity),
+        capacitance_f_per_m=sensor.capacitance_f_per_m * capacitance, leak_s_per_m=leak_s / sensor.length_m,
+    )  # fmt: skip
+
+
+def at_rest(sensor: Sensor, frequency_hz: Real) -> Complex:
+    """Ln Z with nothing on the sensor (m,)."""
+    return np.asarray(np.log(sensor.impedance(frequency_hz, 0.0, sensor.length_m / 2)))
+
+
+def pressed(sensor: Sensor, frequency_hz: Real, force_n: Real, position_m: Real, stiffness: float = 1.0) -> Complex:
+    """By how much presses move ln Z (p, m), of a film that is stiffer by a factor [-]: as a weaker press on ours."""
+    z = sensor.impedance(frequency_hz, force_n[:, None] / stiffness, position_m[:, None])
+    return np.asarray(np.log(z) - at_rest(sensor, frequency_hz))

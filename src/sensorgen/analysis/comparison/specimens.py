@@ -334,11 +334,11 @@ def _unused(rows: Iterable[Compared], alternating: Container[int]) -> Iterator[t
             yield name, "no design is known: nothing to compare it with"
         if row.reading.number in alternating:
             continue
-        if not row.reading.y_ohm and not row.reading.z_ohm:
+        missing = [of for of, ohm in (("R_Y", row.reading.y_ohm), ("R_Z", row.reading.z_ohm)) if not ohm]
+        if len(missing) == 2:
             yield name, "no measurement in it"
-        elif not row.reading.y_ohm or not row.reading.z_ohm:
-            missing = "R_Z" if not row.reading.z_ohm else "R_Y"
-            yield name, f"no {missing}: counts for nothing where both are needed"
+        elif missing:
+            yield name, f"no {missing[0]}: counts for nothing where both are needed"
         if any(value < 0 for value in (*row.reading.y_ohm, *row.reading.z_ohm)):
             yield name, "a resistance below 0 is no reading"
 

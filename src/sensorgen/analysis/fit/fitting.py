@@ -11,8 +11,8 @@ import numpy as np
 from sensorgen.analysis.calibration import Bench, SpecimenEntries, known
 from sensorgen.analysis.comparison import Compared, Comparison, Predicted, of_iteration
 from sensorgen.analysis.comparison.allowed import AllowedValues, allowed, usable
-from sensorgen.analysis.comparison.moved import Movable, at_rest
-from sensorgen.analysis.fit import resistance, tones
+from sensorgen.analysis.comparison.expected import Movable, at_rest
+from sensorgen.analysis.fit import estimates
 from sensorgen.analysis.fit.results import Error, Fit, Fitted, Untold
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.design.body import Body, BodyOf
@@ -80,7 +80,7 @@ def fit(
     apart, design = held_back(names, seed, held_share), next(iter(comparison.bodies.values())).design
     step("values")
     fits = [
-        tones.of_specimen(one, print_, Movable(comparison.bodies[comparison.names[one.specimen]]))
+        estimates.of_specimen(one, print_, Movable(comparison.bodies[comparison.names[one.specimen]]))
         for one, print_ in measured if one.specimen not in apart
     ]  # fmt: skip
     values, untold = _fitted([reading for name, reading in readings if name not in apart], fits, design, seed)
@@ -89,7 +89,7 @@ def fit(
         *_reading_errors({specimen for specimen, _ in readings} & apart, comparison, values),
         *_rest_errors([one for one, _ in measured if one.recorded and one.specimen in apart], comparison, values),
     )
-    groups = tuple(resistance.by_group(_groups(allowing), design.slot("top_electrode")[0].name))
+    groups = tuple(estimates.by_group(_groups(allowing), design.slot("top_electrode")[0].name))
     return Fit(
         iteration, specimens, seed, tuple(values), tuple(untold), errors, len(names) - len(apart),
         tuple(sorted(apart)), tuple(left_out), _fingerprint(log, (iteration, specimens)), groups=groups,
@@ -142,11 +142,15 @@ def held_back(names: Sequence[str], seed: int, share: float = HELD_BACK) -> froz
 
 
 def _fitted(
-    readings: Sequence[AllowedValues], fits: Sequence[tones.OfSpecimen], design: Design, seed: int
+    readings: Sequence[AllowedValues], fits: Sequence[estimates.OfSpecimen], design: Design, seed: int
 ) -> tuple[list[Fitted], list[Untold]]:
     """All values and all that stays open; of two values of one quantity the one that is known better."""
     electrode, film = design.slot("top_electrode")[0].name, design.slot("film")[0].name
-    results = [resistance.resistivity(readings, electrode), *tones.values(fits), resistance.leak(readings, film, seed)]
+    results = [
+        estimates.resistivity(readings, electrode),
+        *estimates.values(fits),
+        estimates.leak(readings, film, seed),
+    ]
     values = sorted((one for one in results if isinstance(one, Fitted)), key=lambda one: -one.high / one.low)
     best = {(one.material, one.quantity): one for one in values}  # the narrowest
     ordered = {key: best[key] for key in ((r.material, r.quantity) for r in results if isinstance(r, Fitted))}

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from sensorgen.models.sensor import Sensor
 
+
 PAGE, IDENTIFIABILITY = "predict.html", "identifiability.png"
 STEPS = (
     IDENTIFIABILITY, "resistance.png", "reactance.png", "resistance-by-position.png", "resistance-by-force.png",
@@ -35,12 +36,15 @@ def files(
     MissingValue
         Matplotlib or Plotly is not installed.
     """
-    from sensorgen.analysis.plots import identifiability, pages, response, static
-    from sensorgen.analysis.plots.libraries import needed
+    from sensorgen.analysis.plots import pages, response, static
+    from sensorgen.analysis.plots.figure import needed
 
     needed("matplotlib", "plotly")
     answer = response.response(sensor, frequency_hz, force_n, position_mm)
-    drawn = [identifiability.figure(sensor, frequency_hz, force_n=force_n[-1], title=title), *response.figures(answer)]
+    drawn = [
+        response.identifiability_figure(sensor, frequency_hz, force_n=force_n[-1], title=title),
+        *response.figures(answer),
+    ]
     for figure in drawn:
         yield f"{figure.key}.png", static.png(figure)
     words = (

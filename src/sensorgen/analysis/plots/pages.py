@@ -98,8 +98,8 @@ def page(
     MissingValue
         Plotly is not installed, and there are figures.
     """
+    from sensorgen.analysis.plots.figure import needed
     from sensorgen.analysis.plots.interactive import data, height_px
-    from sensorgen.analysis.plots.libraries import needed
 
     figures = [figure for section in sections for figure in section.figures]
     sheets = {drawing.design: drawing.svg for section in sections for drawing in section.drawings}

@@ -1,17 +1,23 @@
-"""Figures of results that notebooks show: findings in the section of a sensor, and sweeps."""
+"""Figures of results: findings in the section of a sensor, sweeps, a cell under stress, and contacts of a sheet."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import inf
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sensorgen.analysis.plots.figure import BLUE, COLOURS, ORANGE, Axis, Curve, Figure, Panel, look, scale
+from sensorgen.analysis.plots import static
+from sensorgen.analysis.plots.figure import BLUE, COLOURS, ORANGE, Axis, Curve, Figure, Map, Panel, look, scale
 from sensorgen.checks.review import Review
 from sensorgen.core.document import Cell, Table
+from sensorgen.core.units import M_PER_MM
+from sensorgen.prediction.compression import CompressionResult
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.sweep import Sweep
+
+if TYPE_CHECKING:
+    from sensorgen.models.sheet import Port, PressErrors, Sheet
 
 _SEVERITIES = {"info": BLUE, "warning": ORANGE, "error": "#d1242f"}  # the most severe on top
 
@@ -121,3 +127,67 @@ def _lines(
 
 def _is_number(cell: Cell) -> bool:
     return isinstance(cell, float | int) and not isinstance(cell, bool)
+
+
+def compression_figure(result: CompressionResult) -> Figure:
+    """Displacement and capacitance of a result over stress."""
+    stress, displacement = result.stress_kpa, result.displacement_um
+    x = Axis("stress [kPa]", low=0.0)
+    curve = (Curve("line", "", stress, displacement), Curve("points", "", stress, displacement))
+    panels = [Panel(curve, x, Axis("displacement of the top [µm]", low=0.0))]
+    bounds = {"lower bound": (result.lower_f_per_m2, BLUE, "triangle-up"),
+              "upper bound": (result.upper_f_per_m2, ORANGE, "triangle-down")}  # fmt: skip
+    at = [p for p, value in zip(stress, result.lower_f_per_m2, strict=True) if value is not None]
+    if at:
+        curves = tuple(
+            Curve("points", name, at, [1e9 * c for c in values if c is not None], colour=colour, symbol=symbol)
+            for name, (values, colour, symbol) in bounds.items()
+        )
+        panels.append(Panel(curves, x, Axis("capacitance [nF/m²]")))
+    conditions = ", ".join(f"{key} {value}" for key, value in result.held.items())
+    alt = "Displacement of the top and capacitance per area over stress."
+    return Figure("compression", f"{result.model}: {conditions}", alt, {"": tuple(panels)}, columns=2)
+
+
+_LEAST = 1 / 30  # of the error without information, at which the colours begin
+
+
+def sheet_png(film: "Sheet", bounds: Mapping[str, "PressErrors"], ports: Mapping[str, Sequence["Port"]]) -> bytes:
+    """Standard errors of x and y over the sheet, one column per set of contacts, as PNG.
+
+    The colours end at the error without a reading: of a uniform distribution over the sheet.
+
+    Parameters
+    ----------
+    film : Sheet
+        Under load.
+    bounds : mapping of str to PressErrors
+        By the name of the set of contacts.
+    ports : mapping of str to sequence of Port
+        The contacts of each set.
+
+    Raises
+    ------
+    MissingValue
+        Matplotlib is not installed.
+    """
+    panels = tuple(_port_panel(film, name, bounds[name], ports[name], row) for row in (0, 1) for name in bounds)
+    title = "Standard error of a load's position, outline known; contacts red; scale up to the error without a reading"
+    alt = "Standard errors of x above and of y below, over the sheet, one column per set of contacts."
+    return static.png(Figure("sheet", title, alt, {"": panels}, columns=len(bounds)))
+
+
+def _port_panel(film: "Sheet", name: str, bounds: "PressErrors", ports: Sequence["Port"], row: int) -> Panel:
+    none_mm = bounds.guess_m[row] / M_PER_MM
+    sigma_mm = bounds.sigma(outline=True)[..., 1 + row].T / M_PER_MM
+    shown = np.clip(sigma_mm, none_mm * _LEAST, none_mm)
+    drawn = Map(bounds.x_m / M_PER_MM, bounds.y_m / M_PER_MM, shown, f"error of {'xy'[row]} [mm]", none_mm * _LEAST,
+                none_mm, log=True)  # fmt: skip
+    contacts = []
+    for plus, _ in ports:
+        (left, right), (front, back) = ((a / M_PER_MM for a in span) for span in (plus.x_m, plus.y_m))
+        outline = [left, right, right, left, left], [front, front, back, back, front]
+        contacts.append(Curve("line", "", *outline, colour="#ff0000"))
+    x, y = (Axis(f"{axis} [mm]", low=0.0, high=size / M_PER_MM)
+            for axis, size in (("x", film.length_m), ("y", film.width_m)))  # fmt: skip
+    return Panel((drawn, *contacts), x, y, title="" if row else name, equal=True)

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sensorgen.analysis.plots.figure import GREY, SYMBOLS, Axis, BodyTriangles, Curve, Figure, Map, Panel
-from sensorgen.analysis.plots.libraries import needed
+from sensorgen.analysis.plots.figure import GREY, SYMBOLS, Axis, BodyTriangles, Curve, Figure, Map, Panel, needed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -113,13 +112,16 @@ def _titled(axes: "Axes", panel: Panel, below: Sequence[Panel], before: Sequence
     axes.set_ylabel("" if before and before[0].y.title == panel.y.title else panel.y.title)
 
 
+_SCALES = {False: "linear", True: "log"}
+
+
 def _panel(axes: "Axes", panel: Panel, figure: Figure) -> None:
     if panel.title:
         axes.set_title(panel.title, fontsize="medium")
     if panel.solid:
         _bodies(axes, [body for body in panel.content if isinstance(body, BodyTriangles)], figure)
         return
-    axes.set(xscale="log" if panel.x.log else "linear", yscale="log" if panel.y.log else "linear")
+    axes.set(xscale=_SCALES[panel.x.log], yscale=_SCALES[panel.y.log])
     left = np.zeros(max(1, len(panel.y.names)))
     for part in panel.content:
         if isinstance(part, Map):
@@ -175,11 +177,16 @@ def _curve(axes: "Axes", curve: Curve, names: tuple[str, ...], left: Any) -> Non
     elif curve.kind == "line":
         axes.plot(x, y, _STYLES[curve.dash], color=curve.colour, lw=1, label=label)
     else:
-        if len(curve.low):
-            axes.hlines(y, curve.low, curve.high, color=curve.colour, lw=1.2)
-        marker, size = _MARKERS[curve.symbol.removesuffix("-open")], 5 if len(x) < 200 else 3
-        face = "none" if curve.symbol.endswith("-open") else curve.colour
-        axes.plot(x, y, linestyle="", marker=marker, color=curve.colour, ms=size, mfc=face, label=label)
+        _points(axes, curve, x, y, label)
+
+
+def _points(axes: "Axes", curve: Curve, x: Any, y: Any, label: str) -> None:
+    """Points with their intervals, if they have any."""
+    if len(curve.low):
+        axes.hlines(y, curve.low, curve.high, color=curve.colour, lw=1.2)
+    marker, size = _MARKERS[curve.symbol.removesuffix("-open")], 5 if len(x) < 200 else 3
+    face = "none" if curve.symbol.endswith("-open") else curve.colour
+    axes.plot(x, y, linestyle="", marker=marker, color=curve.colour, ms=size, mfc=face, label=label)
 
 
 def _map(axes: "Axes", part: Map, label: str) -> None:
@@ -200,6 +207,12 @@ def _map(axes: "Axes", part: Map, label: str) -> None:
     extend = _EXTEND[smallest < low - least, largest > high + least]
     shown = "{x:g}" if part.log else ScalarFormatter(useOffset=False)
     bar = axes.figure.colorbar(mesh, ax=axes, extend=extend, format=shown, label=label)
+    _contours(axes, part, bar)
+
+
+def _contours(axes: "Axes", part: Map, bar: Any) -> None:
+    """Levels within the map, the first of them solid; also in the bar of a logarithmic one."""
+    smallest, largest = part.extent
     colour, width, alpha, others = ("white", 1.4, 1.0, "dashed") if part.log else ("black", 0.4, 0.6, "solid")
     for k, level in enumerate(part.levels):
         if smallest < level < largest:

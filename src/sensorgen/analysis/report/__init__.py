@@ -25,6 +25,6 @@ def pieces(content: Report, how: str) -> Iterator[str]:
     how : str
         One of ``FORMATS``.
     """
-    from sensorgen.analysis.report.formats import WRITERS
+    from sensorgen.analysis.report.contents import WRITERS
 
     yield from WRITERS[how](content)

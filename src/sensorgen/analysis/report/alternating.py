@@ -134,18 +134,21 @@ def headline(rows: Sequence[AcRow]) -> Iterator[str]:
     inside = sum(row.c_from_pf <= row.c_pf <= row.c_to_pf for row in here)  # type: ignore[operator]
     at = at_text(lowest)
     if len(here) == 1:
-        row = here[0]
-        error = f" ± {row.c_error_pf:.2g}" if isfinite(row.c_error_pf) else ""
-        yield (
-            f"Capacitance of {row.specimen} at {at}: measured {row.c_pf:.4g}{error} pF, predicted as printed "
-            f"{row.c_predicted_pf:.4g} pF ({row.c_from_pf:.3g} to {row.c_to_pf:.3g}): ratio {row.c_ratio:.3g}, "
-            f"{'within' if inside else 'outside'} the range."
-        )
+        yield _headline_of_one(here[0], at, inside=bool(inside))
         return
     specimens = len({row.specimen for row in here})
     yield (
         f"Capacitance at {at}: measured {median(row.c_ratio for row in here):.3g} times the prediction as printed "
         f"(median of {len(here)} readings of {specimens} specimens; {inside} within its range)."
+    )
+
+
+def _headline_of_one(row: AcRow, at: str, *, inside: bool) -> str:
+    error = f" ± {row.c_error_pf:.2g}" if isfinite(row.c_error_pf) else ""
+    return (
+        f"Capacitance of {row.specimen} at {at}: measured {row.c_pf:.4g}{error} pF, predicted as printed "
+        f"{row.c_predicted_pf:.4g} pF ({row.c_from_pf:.3g} to {row.c_to_pf:.3g}): ratio {row.c_ratio:.3g}, "
+        f"{'within' if inside else 'outside'} the range."
     )
 
 
@@ -169,7 +172,7 @@ def findings(rows: Sequence[AcRow]) -> Iterator[str]:
         sentences.setdefault(capacitor_from(of), []).append(specimen)
     yield from (f"By frequency: {some(names, 8)}: {words}." for words, names in sentences.items())
     if flagged := [row.flag for row in rows if row.flag]:
-        kinds = Counter(kind for flag in flagged for kind in flag.split("; "))
+        kinds = Counter("; ".join(flagged).split("; "))
         counted = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
         yield f"Flagged: {len(flagged)} of {len(rows)} AC values ({counted}): check contacts, compensation and range."
 

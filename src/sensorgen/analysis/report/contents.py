@@ -1,18 +1,24 @@
-"""Content of a report, whatever it is written as."""
+"""Content of a report with the origin of everything in it, and the report as HTML, Markdown, CSV and JSON."""
 
+import csv
+import io
+import json
+import platform
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Annotated
+from importlib.metadata import version
+from typing import Annotated, Any
 
 from sensorgen.analysis.comparison import Comparison, of_iteration
-from sensorgen.analysis.comparison.runs import RecordedRun, runs
+from sensorgen.analysis.comparison.measured import RecordedRun, runs
 from sensorgen.analysis.comparison.specimens import UNTRUSTED, known_iterations
+from sensorgen.analysis.plots import pages
 from sensorgen.analysis.plots.figure import Figure
 from sensorgen.analysis.plots.pages import PageSection
 from sensorgen.analysis.report import (
     alternating,
-    calibrations,
     direction,
     electrodes,
     explained,
@@ -21,12 +27,72 @@ from sensorgen.analysis.report import (
     variants,
     yields,
 )
-from sensorgen.analysis.report.provenance import origins
-from sensorgen.core.document import Column, Part, Table
+from sensorgen.core.document import Column, Part, Table, plain, safe, spreadsheet
+from sensorgen.core.document import markdown as document
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log import Log
+from sensorgen.core.version import __version__
+from sensorgen.design.materials import SET, citations
+from sensorgen.measure.log import Anchor, Log, RawFile
 from sensorgen.measure.log.notes import specimen as named
 from sensorgen.prediction.calibration.calibration import Calibration
+
+LIBRARIES = ("numpy", "scipy", "plotly", "matplotlib", "jinja2")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """A program, file, prediction or source."""
+
+    kind: Annotated[str, Column("kind")]
+    name: Annotated[str, Column("name")]
+    which: Annotated[str, Column("which")]
+
+
+def origins(log: Log, comparison: Comparison, *, brief: bool = False) -> Table:
+    """Versions, the log, raw files, designs with the predictions of each, and sources of material values.
+
+    Parameters
+    ----------
+    log : Log
+        An open one.
+    found : Comparison
+        What the report is of.
+    brief : bool
+        Only program, log and predictions.
+    """
+    records, head = log.head()
+    readings = Counter(r.reading.words.source for r in comparison.rows)
+    predictions = [
+        Origin("prediction", f"{p.design} ({p.design_id})", p.provenance) for p in comparison.predictions.values()
+    ]
+    program = Origin("program", "sensorgen", __version__)
+    logged = Origin("log", log.path.name, f"{records} records; head {head}")
+    if brief:
+        return Table.of("provenance", "Program, log and prediction", (program, logged, *predictions))
+    anchors = log.entries(Anchor)
+    rows = [
+        program, Origin("program", "Python", platform.python_version()),
+        *(Origin("library", name, version(name)) for name in LIBRARIES),
+        logged,
+        *(Origin("anchor", a.file, f"{a.logged_at}: record {log.sequence(a.head)}, {a.head}") for a in anchors),
+        *(Origin("raw file", f.name, f"SHA-256 {f.uid}, {f.size} bytes") for f in log.entries(RawFile)),
+        *(Origin("source of readings", name, f"{count} readings") for name, count in sorted(readings.items())),
+        *predictions, *_sources(comparison),
+    ]  # fmt: skip
+    return Table.of("provenance", "Programs, files, designs and sources", tuple(rows))
+
+
+def _sources(comparison: Comparison) -> list[Origin]:
+    used: dict[str, set[str]] = {}
+    for of in comparison.predictions.values():
+        for value in of.prediction.values:
+            used.setdefault(value.source, set()).add(f"{value.material} {value.quantity} = {value.value:.6g}")
+    known = citations() | {SET: "by the design itself"}
+    return [
+        Origin("source of values", name, f"{known.get(name, name)}: {', '.join(sorted(values))}")
+        for name, values in sorted(used.items())
+    ]
+
 
 STEPS = ("readings", "recordings", "residuals", "variants", "page")
 
@@ -120,7 +186,7 @@ def report(
         )
     step("residuals")
     names = {row.reading.specimen for row in comparison.rows} | {run.entry.specimen for run in recorded}
-    calibrated = calibrations.latest(log, names, left_out)
+    calibrated = history.latest(log, names, left_out)
     own = {one.specimen for one in calibrated}  # a calibration explains more than one parameter can
     explanations = explained.explanations(comparison, [run for run in recorded if run.entry.specimen not in own])
     impedances = recordings.impedances(recorded, comparison) if recorded else None
@@ -131,7 +197,7 @@ def report(
         *_untrusted(left_out),
     )  # fmt: skip
     findings = (
-        *calibrations.findings(calibrated), *yields.findings(comparison), *direction.findings(comparison),
+        *history.calibration_findings(calibrated), *yields.findings(comparison), *direction.findings(comparison),
         *history.findings(changes), *alternating.findings(ac), *alternating.behind_leak(comparison),
         *electrodes.beyond_meter(comparison), *recordings.findings(recorded, impedances),
         *explained.sentences(explanations), *electrodes.findings(comparison),
@@ -189,7 +255,7 @@ def _sections(
         parts = (explained.table(explanations), explained.NOTE)
         yield PageSection("explained-by", "Which parameter explains the residuals", (), parts)
     if calibrated:
-        parts = (calibrations.table(calibrated), calibrations.NOTE)
+        parts = (history.calibration_table(calibrated), history.CALIBRATION_NOTE)
         yield PageSection("calibrated", "Calibrated specimens", (), parts)
     if recorded:
         figures = tuple(recordings.figures(recorded))
@@ -203,3 +269,78 @@ def _sections(
         parts = (Table.of("left_out", caption, tuple(LeftOut(*row) for row in left_out)),)
         yield PageSection("left-out", "What was left out, and why", parts=parts)
     yield PageSection("provenance", "Provenance", parts=(origins(log, comparison, brief=alone),))
+
+
+def html(report: Report) -> Iterator[str]:
+    """One page that needs nothing else."""
+    yield pages.page(
+        report.title, (), report.sections, headline=report.headline, findings=report.findings, made_at=report.made_at
+    )
+
+
+def markdown(report: Report) -> Iterator[str]:
+    """Headings, sentences and tables."""
+    return (f"{line}\n" for line in _lines(report))
+
+
+def _lines(report: Report) -> Iterator[str]:
+    lines = [f"# {safe(report.title)}", "", *(f"**{safe(text)}**  " for text in report.headline), ""]
+    yield from (*lines, *(f"- {safe(text)}" for text in report.findings))
+    for section in report.sections:
+        yield from ("", f"## {safe(section.title)}", "")
+        yield from (f"- {safe(v.design)} (design {v.design_id}): {safe(v.words)}" for v in section.drawings)
+        yield from document(section.parts)
+    yield from ("", f"Made {report.made_at}.")
+
+
+def comma_separated(report: Report) -> Iterator[str]:
+    """Every cell of every table in a row of its own: table, row, column, unit, value."""
+    yield "table,row,column,unit,value\n"
+    for table in report.tables:
+        for number, row in enumerate(table.cells, 1):
+            target = io.StringIO(newline="")
+            csv.writer(target, lineterminator="\n").writerows(
+                (table.key, number, column.name, column.unit, spreadsheet(cell))
+                for column, cell in zip(table.columns, row, strict=True)
+            )
+            yield target.getvalue()
+
+
+class _Listed(list[Any]):
+    """Rows that JSON's encoder reads one after the other."""
+
+    def __init__(self, rows: Iterator[Any], count: int) -> None:
+        super().__init__()
+        self._rows, self._count = rows, count
+
+    def __iter__(self) -> Iterator[Any]:
+        return self._rows
+
+    def __len__(self) -> int:
+        return self._count
+
+
+def as_json(report: Report) -> Iterator[str]:
+    """Everything but the figures."""
+
+    def of_table(t: Table) -> dict[str, Any]:
+        rows = _Listed(([*map(plain, row)] for row in t.cells), len(t.cells))
+        columns = [{"name": c.name, "unit": c.unit, "about": c.about} for c in t.columns]
+        return {"key": t.key, "caption": t.caption, "columns": columns, "rows": rows}
+
+    sections = [
+        {
+            "key": s.key, "title": s.title, "notes": s.notes, "tables": [*map(of_table, s.tables)],
+            "variants": [{"design": v.design, "design_id": v.design_id, "words": v.words} for v in s.drawings],
+        }
+        for s in report.sections
+    ]  # fmt: skip
+    content = {
+        "title": report.title, "iteration": report.iteration, "made_at": report.made_at, "headline": report.headline,
+        "findings": report.findings, "sections": sections,
+    }  # fmt: skip
+    yield from json.JSONEncoder(ensure_ascii=False, indent=1, allow_nan=False).iterencode(content)
+    yield "\n"
+
+
+WRITERS = {"html": html, "md": markdown, "csv": comma_separated, "json": as_json}

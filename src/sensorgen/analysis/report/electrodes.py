@@ -149,6 +149,15 @@ def headline(comparison: Comparison) -> Iterator[str]:
 
 def findings(comparison: Comparison) -> Iterator[str]:
     """When predictions were made, and which electrodes touch as drawn."""
+    yield from _order(comparison)
+    touching = Counter(r.predicted.design for r in comparison.rows if r.predicted and r.predicted.touches)
+    if touching:
+        names = ", ".join(f"{name} ({count})" for name, count in sorted(touching.items()))
+        yield f"Shorted by design, the electrodes touch as printed: {names}; {touching.total()} readings."
+
+
+def _order(comparison: Comparison) -> Iterator[str]:
+    """When predictions were made: before or after the measurements."""
     every = [(bool(p.stored_at), p.before) for p in comparison.predictions.values()]
     before = every.count((True, True))
     late = {
@@ -161,10 +170,6 @@ def findings(comparison: Comparison) -> Iterator[str]:
         order = "stored before anything was measured, by the order of the log's records"
         predictions = "prediction was" if len(every) == 1 else "predictions were"
         yield f"{before} of {len(every)} {predictions} {order}{rest}."
-    touching = Counter(r.predicted.design for r in comparison.rows if r.predicted and r.predicted.touches)
-    if touching:
-        names = ", ".join(f"{name} ({count})" for name, count in sorted(touching.items()))
-        yield f"Shorted by design, the electrodes touch as printed: {names}; {touching.total()} readings."
 
 
 def figures(comparison: Comparison) -> tuple[Figure, ...]:
@@ -189,17 +194,21 @@ def _names(rows: Sequence[Compared]) -> tuple[str, ...]:
     return tuple(f"{name} (no. {number})" if count[name] > 1 else name for name, number in named)
 
 
-def _ratios(rows: Sequence[Compared], left_out: str) -> Figure:
-    names = _names(rows)
-    bounds = [row.expected_ohm for row in rows]
-    low, high = ([getattr(b, end) / b.value if b else 1.0 for b in bounds] for end in ("lower", "upper"))
-    curves = [Curve("ranges", "predicted interval", [1.0] * len(rows), names, low, high, colour=GREY)]
+def _by_verdict(rows: Sequence[Compared], names: Sequence[str]) -> Iterator[Curve]:
+    """Ratios of the rows, each verdict in its colour."""
     for word in dict.fromkeys(row.verdict.word for row in rows):
         here = [(name, row) for name, row in zip(names, rows, strict=True) if row.verdict.word == word]
         points = [exp(row.residual) for _, row in here], [name for name, _ in here]
         text = ["; ".join(row.verdict.reasons) for _, row in here]
-        curves.append(Curve("points", word, *points, text=text, colour=VERDICT_COLOURS[word]))
-    panel = Panel(tuple(curves), Axis("measured / predicted", log=True), Axis(names=names))
+        yield Curve("points", word, *points, text=text, colour=VERDICT_COLOURS[word])
+
+
+def _ratios(rows: Sequence[Compared], left_out: str) -> Figure:
+    names = _names(rows)
+    bounds = [row.expected_ohm for row in rows]
+    low, high = ([getattr(b, end) / b.value if b else 1.0 for b in bounds] for end in ("lower", "upper"))
+    interval = Curve("ranges", "predicted interval", [1.0] * len(rows), names, low, high, colour=GREY)
+    panel = Panel((interval, *_by_verdict(rows, names)), Axis("measured / predicted", log=True), Axis(names=names))
     inside = sum(bool(row.inside) for row in rows)
     alt = (
         f"{len(rows)} readings over their predicted value, on a logarithmic axis; {inside} lie within the "

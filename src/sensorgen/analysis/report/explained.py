@@ -15,15 +15,14 @@ from typing import Annotated, Any
 import numpy as np
 
 from sensorgen.analysis.comparison import Comparison
-from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
-from sensorgen.analysis.comparison.runs import RecordedRun
+from sensorgen.analysis.comparison.expected import Movable, at_rest, moved, pressed
+from sensorgen.analysis.comparison.measured import RecordedRun
 from sensorgen.analysis.report.electrodes import usable
 from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.measure.recording.samples import Complex, Real
-from sensorgen.measure.signal.leakage import across_ohm
-from sensorgen.measure.signal.verdicts import INTACT_OHM
+from sensorgen.measure.signal.verdicts import INTACT_OHM, across_ohm
 
 RESISTIVITY, PERMITTIVITY, MODULUS, FILM, LEAK = PARAMETERS = (
     "electrode resistivity", "film permittivity", "all moduli", "film thickness", "film leakage",

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from sensorgen.analysis.comparison import Comparison
-from sensorgen.analysis.comparison.runs import RecordedRun
+from sensorgen.analysis.comparison.measured import RecordedRun
 from sensorgen.analysis.plots import recordings as plots
 from sensorgen.analysis.plots.figure import BLUE, ORANGE, Axis, Curve, Figure, Panel
 from sensorgen.analysis.report.alternating import F_PER_PF, at_text, capacitor_from, verdict

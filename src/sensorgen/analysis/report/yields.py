@@ -213,6 +213,18 @@ def figures(comparison: Comparison) -> tuple[Figure, ...]:
     return (*_ratios(comparison), _counts(known), *_shares(known))
 
 
+def _by_shape(rows: Sequence[Compared]) -> Iterator[Curve]:
+    """Resistances of the readings, each shape with its look."""
+    by_shape: dict[str, list[Compared]] = {}
+    for row in rows:
+        by_shape.setdefault(row.reading.shape, []).append(row)
+    for shape, here in sorted(by_shape.items()):
+        yield Curve(
+            "points", shape, [r.verdict.ry_ohm for r in here], [r.verdict.rz_ohm for r in here],
+            text=[f"{r.reading.specimen}: {r.verdict.word}" for r in here], **_LOOKS.get(shape, _OTHER),
+        )  # fmt: skip
+
+
 def _ratios(comparison: Comparison) -> Iterator[Figure]:
     known = comparison.rows.where(lambda r: isfinite(r.verdict.ratio) and r.verdict.rz_ohm > 0)
     if not known:
@@ -224,15 +236,7 @@ def _ratios(comparison: Comparison) -> Iterator[Figure]:
         Curve("line", f"film = {factor:g} x electrode", ends, [factor * x for x in ends], colour=GREY, dash=dash)
         for factor, dash in ((2.0, "solid"), (ORDER, "dash"))
     ]
-    by_shape: dict[str, list[Compared]] = {}
-    for row in rows:
-        by_shape.setdefault(row.reading.shape, []).append(row)
-    for shape, here in sorted(by_shape.items()):
-        curves.append(
-            Curve("points", shape, [r.verdict.ry_ohm for r in here], [r.verdict.rz_ohm for r in here],
-                  text=[f"{r.reading.specimen}: {r.verdict.word}" for r in here],
-                  **_LOOKS.get(shape, _OTHER))
-        )  # fmt: skip
+    curves += _by_shape(rows)
     zero, overload = (sum(r.verdict.rz_ohm == value for r in comparison.rows) for value in (0, inf))
     x, y = Axis("electrode resistance [ohm]", log=True), Axis("film resistance [ohm]", log=True)
     yield Figure(

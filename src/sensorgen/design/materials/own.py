@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from sensorgen.core import paths as places
+from sensorgen.core import files as places
 from sensorgen.design import packs
 
 PLACE = packs.SOURCES  # environment variable with another folder

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from math import asin, hypot, sqrt, tan
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.scene.array import TippedParams, revolved_scene
+from sensorgen.scene.patterns import TippedParams, revolved_scene
 from sensorgen.scene.scene import SLIVER_MM, Fill, Scene, parameter
 
 

@@ -11,8 +11,8 @@ One period, seen along the cogs (e: conductor, x: dielectric)::
 
 from dataclasses import dataclass
 
+from sensorgen.scene.patterns import StripParams
 from sensorgen.scene.scene import Body, Fill, Scene, parameter
-from sensorgen.scene.strips import StripParams
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ One cell, cut through its middle (e: conductor, x: dielectric, blank: air)::
 
 from dataclasses import dataclass
 
-from sensorgen.scene.array import TippedParams, revolved_scene
+from sensorgen.scene.patterns import TippedParams, revolved_scene
 from sensorgen.scene.scene import Fill, Scene, parameter
 
 

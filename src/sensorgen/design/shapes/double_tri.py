@@ -11,8 +11,8 @@ One period, seen along the prisms; each layer as the shape ``tri`` (e: conductor
 
 from dataclasses import dataclass, field, replace
 
+from sensorgen.scene.patterns import LayerFrame, TriangleParams, layer_bodies
 from sensorgen.scene.scene import Body, Fill, Scene, rounded
-from sensorgen.scene.triangles import LayerFrame, TriangleParams, layer_bodies
 
 SHORT = "doubletri"
 _MIDDLE = "middle_electrode_with_cogs"

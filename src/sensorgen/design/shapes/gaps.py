@@ -10,8 +10,8 @@ One period, seen along the strips (e: conductor, x: dielectric, blank: air)::
 
 from dataclasses import dataclass
 
+from sensorgen.scene.patterns import StripParams
 from sensorgen.scene.scene import Body, Fill, Scene, parameter
-from sensorgen.scene.strips import StripParams
 
 
 @dataclass(frozen=True)

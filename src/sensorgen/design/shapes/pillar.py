@@ -11,7 +11,7 @@ One cell, cut through its middle (e: conductor, x: dielectric, blank: air)::
 
 from dataclasses import dataclass
 
-from sensorgen.scene.array import ArrayParams, array_scene
+from sensorgen.scene.patterns import ArrayParams, array_scene
 from sensorgen.scene.scene import Fill, Piece, Scene, box, parameter
 
 

@@ -12,8 +12,8 @@ One period, seen along the prisms (e: conductor, x: dielectric, blank: air)::
 
 from dataclasses import dataclass
 
+from sensorgen.scene.patterns import LayerFrame, TriangleParams, layer_bodies
 from sensorgen.scene.scene import Body, Fill, Scene, rounded
-from sensorgen.scene.triangles import LayerFrame, TriangleParams, layer_bodies
 
 
 @dataclass(frozen=True)

@@ -1,69 +1,90 @@
-"""Check of a G-code file on a simulated printer: faults, time, filament."""
+"""Check of a G-code file on a simulated printer: faults, and its needs of time, filament and purging."""
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import Self
+import math
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
 
-from sensorgen.core.document import Facts, Part
-from sensorgen.core.findings import SEVERITIES, counted
+import numpy as np
+
+from sensorgen.core.errors import MissingValue, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import commands, limits
-from sensorgen.export.gcode.files import Source
-from sensorgen.export.gcode.found import GcodeFinding, merged
 from sensorgen.export.gcode.motion import executed
-from sensorgen.export.gcode.moves import Motion
-from sensorgen.export.gcode.report import FileNeeds, report
+from sensorgen.export.gcode.moves import NO_TOOL, Motion, seconds
+from sensorgen.export.gcode.paths import NOT_MODEL
+from sensorgen.export.gcode.reading import Source
+from sensorgen.export.gcode.results import Checked, FileNeeds, ToolMaterial, merged
 
 
-@dataclass(frozen=True, kw_only=True)
-class Checked(FileNeeds):
-    """Needs of a file, and findings.
+def report(
+    motion: Motion, machine: Printer, loaded: dict[int, str] | None = None,
+    texts: materials.Texts = materials.NO_TEXTS,
+) -> FileNeeds:  # fmt: skip
+    """Sum a file up.
 
-    Attributes
+    Parameters
     ----------
-    findings : tuple of GcodeFinding
-        The severe first.
+    motion : Motion
+        The file.
+    machine : Printer
+        Who is to print it.
+    loaded : dict of int to str, optional
+        Material of each tool; the printer's usual ones where a tool has one only.
+    texts : mapping
+        As of :func:`sensorgen.design.materials.load`.
     """
-
-    findings: tuple[GcodeFinding, ...]
-
-    def errors(self, strict: bool = False) -> list[GcodeFinding]:
-        """Findings that refuse the file; with ``strict`` also the warnings."""
-        bad = SEVERITIES[: 2 if strict else 1]
-        return [f for f in self.findings if f.severity in bad]
-
-    def with_more(self, findings: Iterable[GcodeFinding]) -> Self:
-        """Add further findings."""
-        return replace(self, findings=merged([*self.findings, *findings]))
-
-    def counts(self) -> dict[str, int]:
-        """Number of findings of each severity [-]."""
-        return {severity: sum(f.severity == severity for f in self.findings) for severity in SEVERITIES}
-
-    def document(self) -> Iterator[Part]:
-        """Findings, each with what to change, and what the file takes."""
-        rows = []
-        for f in self.findings:
-            more = f" and {f.count - 1} more" if f.count > 1 else ""
-            rows += [(f.severity, f"{f.rule}, line {f.line}{more}"), ("", f"{f.message} -> {f.advice}")]
-        if rows:
-            yield Facts(tuple(rows))
-        yield from super().document()
+    taken = [change.tool for change in motion.changes if change.tool != NO_TOOL]
+    moving_s = float(seconds(motion, machine.max_speed_mm_s).sum())
+    return FileNeeds(
+        lines=motion.lines,
+        moves=len(motion.rows),
+        layers=int(max(motion.layer.values, default=0)),
+        time_s=moving_s + _dwells_s(motion),
+        tools=tuple(_tools(motion, machine, usual(machine) | (loaded or {}), texts)),
+        tool_changes=sum(a != b for a, b in pairwise(taken)),
+        box_mm=_box_mm(motion),
+    )
 
 
-@dataclass(frozen=True, kw_only=True)
-class CheckedFile(Checked):
-    """A checked file by its name, the printer's, and that of the design that it was checked against, or ""."""
+def _dwells_s(motion: Motion) -> float:
+    """Time that a file waits [s]; 0 where it is no time."""
+    waits = (e.command for e in motion.events if e.command.code == "G4")
+    time_s = sum((w.number("S") or 0.0) + (w.number("P") or 0.0) / 1000 for w in waits)
+    return time_s if 0 <= time_s < math.inf else 0.0
 
-    file: str
-    printer: str
-    design: str = ""
 
-    def document(self) -> Iterator[Part]:
-        """Findings, what the file takes, and how many findings there are."""
-        yield from super().document()
-        yield f"{self.file}: {counted(self.counts())}"
+def _box_mm(motion: Motion) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+    """Lowest and highest corner of what is printed [mm]; None of nothing."""
+    printed, (low, high) = (motion.extruded_mm > 0) & (motion.length_mm > 0), motion.box_mm()
+    if not printed.any():
+        return None
+    axes = range(3)  # one by one: a copy of all places would take much room
+    return tuple(float(low[printed, k].min()) for k in axes), tuple(float(high[printed, k].max()) for k in axes)
+
+
+def usual(machine: Printer) -> dict[int, str]:
+    """Material of each tool, where the printer has one usual material for it."""
+    named = list(machine.default_tools.items())
+    tools = [tool for _, tool in named]
+    return {tool: material for material, tool in named if tools.count(tool) == 1}
+
+
+def _tools(motion: Motion, machine: Printer, loaded: dict[int, str], texts: materials.Texts) -> Iterator[ToolMaterial]:
+    count, start, extruded = len(motion.rows), machine.tool_at_start(), motion.extruded_mm
+    tools = motion.tools.column(count, NO_TOOL if start is None else start).astype(np.int64)
+    kinds = motion.kind.column(count, 0).astype(np.int64)
+    waste = np.array([kind in NOT_MODEL for kind in motion.kinds])[kinds] | (motion.length_mm == 0)
+    for tool in np.unique(tools[extruded > 0]).tolist():
+        material = loaded.get(tool, "")
+        length_mm, purge_mm = (float(extruded[rows].sum()) for rows in (tools == tool, (tools == tool) & waste))
+        volume_mm3 = length_mm * math.pi / 4 * machine.filament_mm**2
+        try:
+            density = materials.load(material, texts=texts).value("density_kg_m3").value if material else None
+        except (MissingValue, UnknownName):
+            density = None
+        mass_g = None if density is None else volume_mm3 * density * 1e-6
+        yield ToolMaterial(tool, material, length_mm, purge_mm, volume_mm3, mass_g)
 
 
 def check(

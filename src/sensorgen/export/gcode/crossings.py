@@ -15,12 +15,11 @@ from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode.moves import Motion
 from sensorgen.export.gcode.paths import Numbering, paths_of, tools_of
+from sensorgen.export.gcode.results import FACE_MM, NEAR_MM
 
 CONTACT_MM = 0.03  # a nozzle within this above a line touches it: less than the thinnest layer
-NEAR_MM = 0.12  # a nozzle within this above a line is one layer over it
 PITCH_MM = 0.05  # between the points of a travel that are looked at
 _RUB_PITCH_MM = 0.1  # as above, of a printed line
-FACE_MM = 0.5  # radius of the flat end of a nozzle: a guess, makers state none
 _PIECE_MM = 2.5  # moves are cut to this for the search of what they meet
 _LEVEL_MM = 1e-3  # tops closer than this are one level
 _ROUNDING_MM = 1e-6

@@ -9,124 +9,23 @@ share of good prints.
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
 
 from sensorgen.core.arrays import Mask, Real, Whole
-from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode.crossings import CONTACT_MM, FACE_MM, NEAR_MM, Crossings, crossings
-from sensorgen.export.gcode.files import Source, text_of
+from sensorgen.export.gcode.crossings import CONTACT_MM, Crossings, crossings
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.moves import Motion, seconds
 from sensorgen.export.gcode.paths import Numbering
+from sensorgen.export.gcode.reading import Source, text_of
+from sensorgen.export.gcode.results import COUNTED_MM, LIFT_MM, Drags, Lifting, OfLayer, ToolTravel
 
-LIFT_MM = 0.2  # 0.4 mm took twice the time and left no less contact
-COUNTED_MM = 0.5  # a crossing is longer than this
 _DRAWN_MM = 2.0  # of a lifted travel over other materials, before which filament is drawn back: as profiles do [mm]
 _RETRACTED = 0.5  # of a tool's usual retraction
 _PLAIN = re.compile(rb"\s*G0*[01] [^;(]*", re.IGNORECASE)  # without a second command in brackets or behind
 _Z = re.compile(rb"\s*Z\s*[-+.0-9]+", re.IGNORECASE)
-
-
-@dataclass(frozen=True)
-class ToolTravel:
-    """Travel of one tool over what other tools have printed."""
-
-    tool: Annotated[int, Column("tool")]
-    contact_mm: Annotated[float, Column("contact", "mm", "travel in contact with another material")]
-    near_mm: Annotated[float, Column("near", "mm", f"travel up to {NEAR_MM:g} mm above it")]
-    crossings: Annotated[int, Column("crossings", "", f"travels with more than {COUNTED_MM:g} mm of both")]
-    unretracted: Annotated[int, Column("unretracted", "", "of these without retraction")]
-    rubbing_mm: Annotated[float, Column("rubbing", "mm", "lines printed while the nozzle's face touches it")]
-
-
-@dataclass(frozen=True)
-class OfLayer:
-    """Travel of one tool at one height."""
-
-    z_mm: Annotated[float, Column("z", "mm")]
-    tool: Annotated[int, Column("tool")]
-    contact_mm: Annotated[float, Column("contact", "mm")]
-    near_mm: Annotated[float, Column("near", "mm")]
-
-
-@dataclass(frozen=True)
-class Drags:
-    """Travel over foreign material in a file, in the order of printing.
-
-    Attributes
-    ----------
-    tools : tuple of ToolTravel
-        Every tool that moves over another's material.
-    layers : tuple of OfLayer
-        Travel alone, by height of the nozzle.
-    """
-
-    tools: tuple[ToolTravel, ...]
-    layers: tuple[OfLayer, ...]
-
-    @property
-    def contact_mm(self) -> float:
-        """Travel in contact, of all tools [mm]."""
-        return sum(t.contact_mm for t in self.tools)
-
-    @property
-    def near_mm(self) -> float:
-        """Travel near, of all tools [mm]."""
-        return sum(t.near_mm for t in self.tools)
-
-    def document(self) -> Iterator[Part]:
-        """Tables by tool and by layer."""
-        if not self.tools:
-            yield "No tool moves over what another has printed."
-            return
-        yield Table.of(
-            "tools", f"Over what other tools have printed; radius of the nozzle's face {FACE_MM:g} mm, assumed",
-            self.tools,
-        )  # fmt: skip
-        if self.layers:
-            yield Table.of("layers", "Travel by height of the nozzle", self.layers)
-
-
-@dataclass(frozen=True)
-class Lifting:
-    """Changes by lifts.
-
-    Attributes
-    ----------
-    before, after : Drags
-        Measured in the file as sliced, and as written.
-    lifts, retractions : int
-        Added [-].
-    added_s : float
-        Time that they take, without acceleration [s].
-    """
-
-    before: Drags
-    after: Drags
-    lifts: int
-    retractions: int
-    added_s: float
-
-    def document(self) -> Iterator[Part]:
-        """Before and after, in two lines."""
-        if not self.before.contact_mm + self.before.near_mm:
-            return
-        was, now = (f"{d.contact_mm:.1f} + {d.near_mm:.1f} mm" for d in (self.before, self.after))
-        rubs = "; ".join(f"tool {t.tool} {t.rubbing_mm:.0f} mm" for t in self.after.tools if t.rubbing_mm)
-        yield Facts(
-            (
-                ("travel", f"over another tool's material, contact + near: {was} as sliced, {now} as written"),
-                (
-                    "lifts", f"{self.lifts} of {LIFT_MM:g} mm with {self.retractions} more retractions, "
-                    f"+{self.added_s:.0f} s; lines unchanged"
-                ),
-                *([("rubbing", f"{rubs}: lines beside another material, which no lift changes")] if rubs else []),
-            )
-        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,13 +6,19 @@ import numpy as np
 
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode import macros
-from sensorgen.export.gcode.arcs import Arcs, centres_of_radius
-from sensorgen.export.gcode.columns import WORDS
-from sensorgen.export.gcode.files import Source, text_of
-from sensorgen.export.gcode.macros import Effect
-from sensorgen.export.gcode.moves import NO_TOOL, Event, FileFault, ModalValues, Motion, ToolChange
-from sensorgen.export.gcode.reading import OFFSET, PLACE, SHIFT, GcodeFile, Holding
+from sensorgen.export.gcode import words
+from sensorgen.export.gcode.moves import (
+    NO_TOOL,
+    Arcs,
+    Event,
+    FileFault,
+    ModalValues,
+    Motion,
+    ToolChange,
+    centres_of_radius,
+)
+from sensorgen.export.gcode.reading import OFFSET, PLACE, SHIFT, WORDS, GcodeFile, Holding, Source, text_of
+from sensorgen.export.gcode.words import Effect
 
 DEFAULT_FEED_MM_MIN = 3000.0  # RepRapFirmware's, until a line says another
 MOST_MM = 1e9  # beyond this a number is a slip, and differences of it are noise
@@ -24,7 +30,7 @@ def follow(source: Source, prime_macro: str = "", change: Effect | None = None) 
     Parameters
     ----------
     source : Path, bytes or iterable of str
-        The G-code; see :func:`sensorgen.export.gcode.files.text_of`.
+        The G-code; see :func:`sensorgen.export.gcode.reading.text_of`.
     prime_macro : str
         Macro that changes tools, as ``tprime{tool}.g``; "" if the printer has none.
     change : Effect, optional
@@ -46,7 +52,7 @@ def follow(source: Source, prime_macro: str = "", change: Effect | None = None) 
 
 def executed(source: Source, machine: Printer) -> Motion:
     """Follow a file as a printer does, its own macros included."""
-    return follow(source, machine.control.prime_macro, macros.of_change(machine))
+    return follow(source, machine.control.prime_macro, words.of_change(machine))
 
 
 class _Steps:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode.files import Source
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.moves import NO_TOOL, Motion
+from sensorgen.export.gcode.reading import Source
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

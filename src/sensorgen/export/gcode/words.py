@@ -1,4 +1,4 @@
-"""One line of G-code to its commands, after RepRapFirmware's own reading.
+"""One line of G-code, after RepRapFirmware's own reading: commands, the effect of macros, slicers' remarks.
 
 A line may carry a number (``N12``), a checksum (``*57``), remarks in brackets or after a semicolon, strings in
 double quotes, and more than one command. Nothing here knows what a command means.
@@ -7,7 +7,11 @@ double quotes, and more than one command. Nothing here knows what a command mean
 import math
 import re
 from dataclasses import dataclass
-from functools import reduce
+from functools import lru_cache, reduce
+from math import nan
+
+from sensorgen.core.errors import BadInput
+from sensorgen.design.printer import Printer
 
 NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
 
@@ -133,19 +137,156 @@ def _read(text: str) -> GcodeLine:
     return GcodeLine(parsed, remark, tuple(faults[:_MOST_FAULTS]))
 
 
+def _begin(commands: list[tuple[str, list[tuple[str, str]]]], letter: str, value: str) -> list[str]:
+    """Add a command without words."""
+    number = float(value) if _NUMBER.fullmatch(value) else math.inf
+    if math.isinf(number):
+        return [f"{letter}{value[:20]} is no command"]
+    commands.append((f"{letter}{int(number)}" if number == int(number) else f"{letter}{value}", []))
+    return []
+
+
 def _take(commands: list[tuple[str, list[tuple[str, str]]]], letter: str, value: str) -> list[str]:
     """Add a word to the last command, or start the next one."""
     if letter == "N" and not commands:
         return []
     if letter in "GM" or (letter == "T" and not commands):
-        number = float(value) if _NUMBER.fullmatch(value) else math.inf
-        if math.isinf(number):
-            return [f"{letter}{value[:20]} is no command"]
-        commands.append((f"{letter}{int(number)}" if number == int(number) else f"{letter}{value}", []))
-        return []
+        return _begin(commands, letter, value)
     if not commands:
         return [f"{letter}{value} stands before any command"]
     quoted = value.startswith('"')
     text = value[1:].removesuffix('"').replace('""', '"') if quoted else value
     commands[-1][1].append((letter, text))
     return [f"the string after {letter} does not end"] if value.count('"') % 2 else []
+
+
+_RESTORE = 2.0  # point at which RepRapFirmware stores where a tool was taken
+
+
+@dataclass(frozen=True)
+class Effect:
+    """State of the machine after macros.
+
+    Attributes
+    ----------
+    offset_mm : tuple of float
+        From where the nozzle was, along X, Y and Z [mm].
+    place_mm : tuple of float
+        Absolute position instead; nan for none [mm].
+    relative : bool or None
+        Mode of places left behind; None if unchanged.
+    waits : bool
+        Wait for the temperature of the tool (M116).
+    """
+
+    offset_mm: tuple[float, ...]
+    place_mm: tuple[float, ...]
+    relative: bool | None
+    waits: bool
+
+
+def of_change(machine: Printer) -> Effect | None:
+    """Effect of a change of tool; None where the printer's file states no macro of it."""
+    text = machine.macro("tfree", "tpre", "tpost")  # run in this order
+    return None if text is None else effect(text)
+
+
+@lru_cache(maxsize=64)
+def effect(text: str) -> Effect:
+    r"""Execute lines of macros.
+
+    Raises
+    ------
+    BadInput
+        A line that cannot be followed, as a condition.
+
+    Examples
+    --------
+    >>> effect("G91\nG1 Z40\nG90\nG1 R2 X0 Y0\nG1 R2 Z2")
+    Effect(offset_mm=(0.0, 0.0, 2.0), place_mm=(nan, nan, nan), relative=False, waits=False)
+    """
+    offset, place, relative, waits = [0.0] * 3, [nan] * 3, None, False
+    for line in text.splitlines():
+        parsed = parse(line)
+        if parsed.faults:
+            raise BadInput(f"macros: {line.strip()[:60]!r} cannot be followed; state its effect: lift_mm, return_mm")
+        for command in parsed.commands:
+            waits |= command.code == "M116"
+            relative = {"G90": False, "G91": True}.get(command.code, relative)
+            if command.code in ("G0", "G1"):
+                _move(command, offset, place, relative=bool(relative))
+    return Effect(tuple(offset), tuple(place), relative, waits)
+
+
+def _move(command: Command, offset: list[float], place: list[float], *, relative: bool) -> None:
+    for k, axis in enumerate("XYZ"):
+        value = command.number(axis)
+        if value is None:
+            continue
+        if command.number("R") == _RESTORE:
+            offset[k], place[k] = value, nan
+        elif relative:
+            offset[k], place[k] = offset[k] + value, place[k] + value
+        else:
+            place[k] = value
+
+
+# Quantities that hold until the next comment of their sort.
+KIND, WIDTH, HEIGHT, LAYER, NEXT_LAYER = "kind", "width", "height", "layer", "next layer"
+MAKER, PRUSA = "maker", "PrusaSlicer"  # who has written the file, once at its top
+
+_LENGTH = re.compile(r"\s*([0-9]+\.?[0-9]*|\.[0-9]+)\s*(?:mm)?\s*")
+_LAYER_AND_Z = re.compile(r"layer ([0-9]+), Z = ")
+_TOOL_LINE = re.compile(r"tool H([0-9.]+) W([0-9.]+)")
+
+_KINDS = ("TYPE", "FEATURE")
+_LENGTHS = {
+    "WIDTH": WIDTH, "LINE_WIDTH": WIDTH, "HEIGHT": HEIGHT, "LAYER_HEIGHT": HEIGHT, "Layer height": HEIGHT,
+}  # fmt: skip
+
+Note = tuple[str, str | float]
+
+
+def notes(remark: str) -> list[Note]:
+    """Quantities and values of one comment, without its semicolon.
+
+    Parameters
+    ----------
+    remark : str
+        The comment of PrusaSlicer, Cura, Orca, Bambu Studio or Simplify3D.
+
+    Returns
+    -------
+    list of (str, str or float)
+        Kind of line in lower case; width and height [mm]; layer from 1 at the bed [-]. Empty for any
+        other comment.
+
+    Examples
+    --------
+    >>> notes("TYPE:External perimeter"), notes("HEIGHT:0.1"), notes("LAYER:0"), notes(" thumbnail begin 16x16")
+    ([('kind', 'external perimeter')], [('height', 0.1)], [('layer', 1.0)], [])
+    """
+    key, _, value = remark.partition(":")
+    key = key.strip()
+    if key in _KINDS:
+        return [(KIND, value.strip().lower())]
+    if key in _LENGTHS:
+        length = _LENGTH.fullmatch(value)
+        return [(_LENGTHS[key], float(length[1]))] if length else []
+    if key in ("LAYER_CHANGE", "CHANGE_LAYER"):
+        return [(NEXT_LAYER, 1.0)]
+    if key == "LAYER":
+        return [(LAYER, float(int(value) + 1))] if re.fullmatch(r"\s*-?[0-9]{1,9}\s*", value) else []
+    if key.startswith(f"generated by {PRUSA}"):
+        return [(MAKER, PRUSA)]
+    return _simplify3d(remark.strip()) if key[:4] in ("feat", "laye", "tool") else []
+
+
+def _simplify3d(remark: str) -> list[Note]:
+    if remark.startswith("feature "):
+        return [(KIND, remark.removeprefix("feature ").strip().lower())]
+    if match := _LAYER_AND_Z.match(remark):
+        return [(LAYER, float(match[1]))]
+    match = _TOOL_LINE.fullmatch(remark)
+    pairs = ((HEIGHT, match[1]), (WIDTH, match[2])) if match else ()
+    return [(quantity, float(value)) for quantity, value in pairs if _LENGTH.fullmatch(value)]

@@ -1,4 +1,4 @@
-"""Run a slicer and say in its own words what it did not like."""
+"""Run a slicer, with bodies as STL where it reads no 3MF, and say in its own words what it did not like."""
 
 import os
 import shutil
@@ -12,9 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.core.leash import NOT_RUN, on_leash
 from sensorgen.export.slicers import TIME_LIMIT_S
+from sensorgen.scene.geometry.meshes import Mesh
 
 KEPT_LINES = 12
 _TICK_S = 0.1
@@ -131,3 +135,21 @@ def _last_words(output: BinaryIO) -> str:
     errors = [line for line in lines if "error" in line.lower()]
     shown = [line for line in lines if line and not any(word in line for word in ("[trace]", "[debug]", "[WARNING]"))]
     return " | ".join((errors or shown)[-KEPT_LINES:]) or "it said nothing"
+
+
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+
+
+def content(mesh: Mesh, shift_mm: NDArray[np.float64]) -> bytes:
+    """The file of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The body [mm].
+    shift_mm : (3,) float64 array
+        Added to every corner [mm].
+    """
+    facets = np.zeros(len(mesh.triangles), dtype=_FACET)
+    facets["corners"] = (mesh.vertices_mm + shift_mm)[mesh.triangles]
+    return bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()

@@ -12,7 +12,7 @@ import numpy as np
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design.tower import Tower
 from sensorgen.export.threemf import core, cura, orca, prusa
-from sensorgen.export.threemf.part import Part, box_mm, check, placed
+from sensorgen.export.threemf.core import Part, box_mm, check, placed
 
 __all__ = ["FAMILIES", "Part", "content", "placed", "plate"]
 

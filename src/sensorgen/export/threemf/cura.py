@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.export.threemf import core
-from sensorgen.export.threemf.part import Part, escaped
+from sensorgen.export.threemf.core import Part, escaped
 
 # PrusaSlicer's name of a setting to Cura's, where both mean the same.
 SETTINGS = {

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.export.threemf import core
-from sensorgen.export.threemf.part import Part, escaped
+from sensorgen.export.threemf.core import Part, escaped
 
 CONFIG = "Metadata/model_settings.config"
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from sensorgen.design.tower import Tower
 from sensorgen.export.threemf import core
-from sensorgen.export.threemf.part import Part, escaped
+from sensorgen.export.threemf.core import Part, escaped
 
 CONFIG = "Metadata/Slic3r_PE_model.config"
 PROFILE = "Metadata/Slic3r_PE.config"

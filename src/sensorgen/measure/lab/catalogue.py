@@ -17,8 +17,7 @@ from pydantic import Field
 
 from sensorgen.core.errors import BadInput, NotInstalled, UnknownName
 from sensorgen.core.records import Line, Strict, checked
-from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import PYMEASURE, Actuator, FrameMeter, ImpedanceMeter, Meter, Role, Stage
+from sensorgen.measure.lab.devices import PYMEASURE, Actuator, Clock, FrameMeter, ImpedanceMeter, Meter, Role, Stage
 from sensorgen.measure.virtual.plant import Plant
 
 GROUP = "sensorgen.devices"

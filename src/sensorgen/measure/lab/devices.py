@@ -1,4 +1,4 @@
-"""Devices of the laboratory: what a run asks of each, whoever made it.
+"""Devices of the laboratory: what a run asks of each, and its time, real or simulated.
 
 No method waits for longer than a message takes: what takes time, a move or a sweep, is begun by one call and followed
 by ``read``, once in every period of the control loop. Before a device has said that it is the expected one, a driver
@@ -6,6 +6,7 @@ sends it nothing but that question. Any failure is a :class:`DeviceFault`.
 """
 
 import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
@@ -14,6 +15,66 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import InstrumentFailed
+
+
+class Clock(Protocol):
+    """Clock of a run and its devices."""
+
+    def now(self) -> float:
+        """Time since any moment; never goes back [s]."""
+
+    def epoch(self) -> float:
+        """Time since 1970, as files have it [s]."""
+
+    def wait_until(self, time_s: float) -> None:
+        """Return at a time of :meth:`now`, at once if it is past [s]."""
+
+
+class RealClock:
+    """The computer's."""
+
+    def now(self) -> float:
+        """Time since the computer's start [s]."""
+        return time.monotonic()
+
+    def epoch(self) -> float:
+        """Time since 1970 [s]."""
+        return time.time()
+
+    def wait_until(self, time_s: float) -> None:
+        """Sleep until a time."""
+        left = time_s - self.now()
+        if left > 0:
+            time.sleep(left)
+
+
+@dataclass
+class SimulatedClock:
+    """Time that passes only where somebody waits.
+
+    Attributes
+    ----------
+    time_s : float
+        Since the begin [s].
+    epoch_s : float
+        Time since 1970 at the begin [s].
+    """
+
+    time_s: float = 0.0
+    epoch_s: float = 1.7e9
+
+    def now(self) -> float:
+        """Time since the begin [s]."""
+        return self.time_s
+
+    def epoch(self) -> float:
+        """Time since 1970 [s]."""
+        return self.epoch_s + self.time_s
+
+    def wait_until(self, time_s: float) -> None:
+        """Let the time pass."""
+        self.time_s = max(self.time_s, time_s)
+
 
 PYMEASURE = "pymeasure:"  # begin of the kinds that are classes of PyMeasure
 Role = Literal["actuator", "stage", "impedance", "meter", "array"]

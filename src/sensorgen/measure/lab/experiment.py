@@ -373,15 +373,19 @@ def check(experiment: Experiment, length_mm: float, seconds: float) -> None:
         )
 
 
-def _check_part(key: str, part: Kind, limit_n: float, places_mm: tuple[float, float]) -> None:
+def _largest_n(key: str, part: Kind) -> tuple[float, str]:
+    """Largest force of a part [N], and the names of what gives it."""
     if isinstance(part, Sine):
-        largest, name = part.mean_n + part.amplitude_n, "mean_n + amplitude_n"
         if part.amplitude_n >= part.mean_n:
             raise OutOfRange(f"{key}.amplitude_n: {part.amplitude_n:g} N lifts the tip; expected less than mean_n")
-    else:
-        forces = part.force_n if isinstance(part.force_n, tuple) else (part.force_n,)
-        _rising(f"{key}.force_n", forces)
-        largest, name = max(forces), "force_n"
+        return part.mean_n + part.amplitude_n, "mean_n + amplitude_n"
+    forces = part.force_n if isinstance(part.force_n, tuple) else (part.force_n,)
+    _rising(f"{key}.force_n", forces)
+    return max(forces), "force_n"
+
+
+def _check_part(key: str, part: Kind, limit_n: float, places_mm: tuple[float, float]) -> None:
+    largest, name = _largest_n(key, part)
     if largest > _ROOM * limit_n:
         raise OutOfRange(
             f"{key}.{name}: {largest:g} N; expected up to {_ROOM * limit_n:.4g} N, {_ROOM:.0%} of limits.force_n, "

@@ -24,8 +24,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex
 from sensorgen.core.records import Strict
-from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import DeviceFault, FrameLot, Identity, WrongDevice
+from sensorgen.measure.lab.devices import Clock, DeviceFault, FrameLot, Identity, WrongDevice
 from sensorgen.measure.lab.port import Port
 
 QUESTION = b"sensorgen-frames?\n"

@@ -24,8 +24,7 @@ from typing import IO, Any, Self, cast
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.records import Strict
 from sensorgen.measure.lab import rigs
-from sensorgen.measure.lab.clock import RealClock
-from sensorgen.measure.lab.devices import DeviceFault
+from sensorgen.measure.lab.devices import DeviceFault, RealClock
 from sensorgen.measure.lab.experiment import Device
 
 REPORT = "guardian.jsonl"

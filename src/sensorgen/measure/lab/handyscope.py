@@ -31,8 +31,7 @@ from sensorgen.core import yamlfile
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, NotInstalled, OutOfRange
 from sensorgen.core.records import Strict, checked
-from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
+from sensorgen.measure.lab.devices import Clock, DeviceFault, Identity, Readings, WrongDevice
 from sensorgen.measure.signal import waveform
 from sensorgen.measure.signal.waveform import multisine
 

@@ -8,8 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from sensorgen.core.arrays import Complex
-from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import DeviceFault, Extension, Place
+from sensorgen.measure.lab.devices import Clock, DeviceFault, Extension, Place
 from sensorgen.measure.lab.experiment import Experiment
 from sensorgen.measure.lab.live import Controls, Sample
 from sensorgen.measure.lab.recorder import Recorder

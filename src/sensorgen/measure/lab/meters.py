@@ -24,8 +24,7 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.records import Strict
-from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
+from sensorgen.measure.lab.devices import Clock, DeviceFault, Identity, Readings, WrongDevice
 from sensorgen.measure.lab.port import Port
 
 _READING = re.compile(r'[-+0-9.,E\s]*|[-+]?[0-9]+,".*"')  # numbers, or an entry of the list of errors

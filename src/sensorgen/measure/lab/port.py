@@ -13,8 +13,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from sensorgen.core.errors import BadInput, NotInstalled, SensorgenError
-from sensorgen.measure.lab.clock import Clock, RealClock
-from sensorgen.measure.lab.devices import DeviceFault
+from sensorgen.measure.lab.devices import Clock, DeviceFault, RealClock
 from sensorgen.measure.virtual.plant import Simulator
 
 _BLOCK = 4096  # bytes: over TCP pyserial only knows that some wait

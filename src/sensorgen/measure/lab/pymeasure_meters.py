@@ -21,8 +21,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.errors import NotInstalled, OutOfRange, UnknownName
 from sensorgen.core.records import Line, Strict
 from sensorgen.measure.lab import meters
-from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import PYMEASURE, DeviceFault, Identity, Readings, Role, WrongDevice
+from sensorgen.measure.lab.devices import PYMEASURE, Clock, DeviceFault, Identity, Readings, Role, WrongDevice
 from sensorgen.measure.lab.port import faults
 
 _HP = ("agilent", "hewlett-packard", "hp", "keysight")

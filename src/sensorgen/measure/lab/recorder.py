@@ -21,8 +21,7 @@ import numpy as np
 from sensorgen.core import files, units
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, Unwritable
-from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import Readings
+from sensorgen.measure.lab.devices import Clock, Readings
 
 if TYPE_CHECKING:
     from sensorgen.measure.log import BenchRun, Log

@@ -22,8 +22,7 @@ from pydantic import Field
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.records import Line, Strict
-from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import DeviceFault, Identity, Place, WrongDevice
+from sensorgen.measure.lab.devices import Clock, DeviceFault, Identity, Place, WrongDevice
 from sensorgen.measure.lab.port import HttpPort, Port, Web
 
 BAUD = 57_600

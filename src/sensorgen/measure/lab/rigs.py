@@ -8,8 +8,7 @@ from typing import Any, cast
 from sensorgen.core.errors import BadInput, within
 from sensorgen.design.design import Design
 from sensorgen.measure.lab import catalogue
-from sensorgen.measure.lab.clock import Clock, RealClock
-from sensorgen.measure.lab.devices import Meter
+from sensorgen.measure.lab.devices import Clock, Meter, RealClock
 from sensorgen.measure.lab.experiment import Device, Devices, Experiment
 from sensorgen.measure.lab.meters import Multimeter
 from sensorgen.measure.lab.port import VisaPort

@@ -18,8 +18,7 @@ from sensorgen.core.version import __version__
 from sensorgen.design.design import Design, load, make
 from sensorgen.measure.lab import experiment as experiments
 from sensorgen.measure.lab import press, recorder, safety
-from sensorgen.measure.lab.clock import Clock, SimulatedClock
-from sensorgen.measure.lab.devices import Identity, SelfLifting
+from sensorgen.measure.lab.devices import Clock, Identity, SelfLifting, SimulatedClock
 from sensorgen.measure.lab.experiment import Choice, DonePress, Experiment, Next, NextPress, PlannedPress
 from sensorgen.measure.lab.live import Controls
 from sensorgen.measure.lab.loop import Alive, Loop, Paused, Predicted, RunView

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 from sensorgen.core.errors import SensorgenError
-from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import Actuator, ImpedanceMeter, Stage
+from sensorgen.measure.lab.devices import Actuator, Clock, ImpedanceMeter, Stage
 
 UP_MM = 1.0  # of its upper end, within which the piston counts as up
 RAISED_MM = 1.0  # above its working height, from which on the stage counts as raised, when it has come to rest

@@ -17,8 +17,15 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.measure.lab import experiment as experiments
 from sensorgen.measure.lab import recorder, rigs
-from sensorgen.measure.lab.clock import Clock, RealClock, SimulatedClock
-from sensorgen.measure.lab.devices import DeviceFault, Identity, ImpedanceMeter, Readings
+from sensorgen.measure.lab.devices import (
+    Clock,
+    DeviceFault,
+    Identity,
+    ImpedanceMeter,
+    Readings,
+    RealClock,
+    SimulatedClock,
+)
 from sensorgen.measure.lab.experiment import Choice, DonePress, Experiment, Next
 from sensorgen.measure.lab.guardian import Guardian, Orders
 from sensorgen.measure.lab.live import LiveText, LiveView, Sample

@@ -25,8 +25,7 @@ from pydantic import Field
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.records import Strict
-from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import DeviceFault, Extension, Identity, WrongDevice
+from sensorgen.measure.lab.devices import Clock, DeviceFault, Extension, Identity, WrongDevice
 from sensorgen.measure.lab.port import Port
 
 BAUD = 115_200

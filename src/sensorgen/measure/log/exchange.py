@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from sensorgen.core import files as store
+from sensorgen.core.display import escaped, harmless
 from sensorgen.core.document import spreadsheet
 from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
-from sensorgen.core.terminal import escaped, harmless
 from sensorgen.measure.csv_table import CsvTable
 from sensorgen.measure.log import entries, files
 from sensorgen.measure.log.entries import (

@@ -310,9 +310,9 @@ def _exported(log: Log, path: Path) -> list[Entry]:
     exported: list[Entry] = []
     for kind, name in exchange.FILES.items():
         file = next((p for suffix in exchange.FORMATS if (p := path / f"{name}.{suffix}").is_file()), None)
-        if file is None and kind in exchange.LATER:
-            continue
         if file is None:
+            if kind in exchange.LATER:
+                continue
             raise BadInput(f"{str(path)!r} has no {name}.csv; expected the folder of an exported log")
         with _table(log, file, {}) as (table, _):
             rows = list(table)

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
-from sensorgen.core import paths
+from sensorgen.core import files as store
 from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, UnknownName, within
 from sensorgen.measure.log import chain, database, files
 from sensorgen.measure.log.chain import Record
@@ -73,7 +73,7 @@ def place() -> Path:
 
     One log for all working folders, and never below ``out/``, which may be deleted.
     """
-    return paths.data(PLACE, "log.db")
+    return store.data(PLACE, "log.db")
 
 
 class Log:

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording.offset import Offset, estimated
-from sensorgen.measure.recording.rig import RigLog
+from sensorgen.measure.recording.rig import Offset, RigLog, estimated
 from sensorgen.measure.recording.samples import Real, Recording
 
 _SILENT = 5.0  # median row distances beyond which the rig's log has a gap

@@ -232,13 +232,7 @@ class _Array:
             return np.empty((0, 0))
         if self._depth > _DEEPEST:
             raise self._damaged(f"more than {_DEEPEST} arrays within each other")
-        flags = self._numbers()
-        if len(flags) < 1:
-            raise self._damaged("an array without flags")
-        shape = tuple(int(n) for n in self._numbers()[: _MOST_AXES + 1])
-        if not 2 <= len(shape) <= _MOST_AXES or min(shape) < 0:
-            raise self._damaged(f"an array of shape {shape}")
-        self._next()  # the name
+        flags, shape = self._head()
         kind = int(flags[0]) & 0xFF
         if kind == _CELL:
             return self._members(prod(shape))
@@ -251,6 +245,17 @@ class _Array:
             raise BadInput(f"{place}: an array of MATLAB class {kind}; expected numbers, text or structs")
         real = self._matrix(shape)
         return Split(real, self._matrix(shape)) if int(flags[0]) & _COMPLEX else real
+
+    def _head(self) -> tuple[Any, tuple[int, ...]]:
+        """Flags and shape of the array, whose name is passed over."""
+        flags = self._numbers()
+        if len(flags) < 1:
+            raise self._damaged("an array without flags")
+        shape = tuple(int(n) for n in self._numbers()[: _MOST_AXES + 1])
+        if not 2 <= len(shape) <= _MOST_AXES or min(shape) < 0:
+            raise self._damaged(f"an array of shape {shape}")
+        self._next()  # the name
+        return flags, shape
 
     def _damaged(self, what: str) -> BadInput:
         return _damaged(what, self._element.offset)

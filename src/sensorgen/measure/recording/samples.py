@@ -316,6 +316,17 @@ def rebuilt(count: int, time_s: Real | None, stamp_s: Real | None) -> Rebuilt:
     return Rebuilt(even, _fitted(even[first], first_stamp - set_back[first]), marks, notes)
 
 
+def _even_by_time(count: int, time_s: Real) -> tuple[Real, tuple[str, ...]]:
+    """Even steps for a time that does not rise everywhere, and a note on that."""
+    steps = np.diff(time_s)
+    rising = steps[np.isfinite(steps) & (steps > 0)]
+    if not len(rising):
+        raise BadInput("the time does not rise at any sample; expected seconds that do")
+    step, first = float(np.median(rising)), time_s[np.flatnonzero(np.isfinite(time_s))[0]]
+    note = f"the time does not rise everywhere: taken as even steps of {step:.6g} s"
+    return np.asarray(first + step * np.arange(count)), (note,)
+
+
 def _even(count: int, time_s: Real | None, stamp_s: Real | None) -> tuple[Real, tuple[str, ...]]:
     """Time of the instrument, or even steps where it does not rise or is missing; and a note on that."""
     if time_s is not None and np.isfinite(time_s).all() and (np.diff(time_s) > 0).all():
@@ -323,13 +334,7 @@ def _even(count: int, time_s: Real | None, stamp_s: Real | None) -> tuple[Real, 
     if count == 1:
         return np.zeros(1), ()
     if time_s is not None:
-        steps = np.diff(time_s)
-        rising = steps[np.isfinite(steps) & (steps > 0)]
-        if not len(rising):
-            raise BadInput("the time does not rise at any sample; expected seconds that do")
-        step, first = float(np.median(rising)), time_s[np.flatnonzero(np.isfinite(time_s))[0]]
-        note = f"the time does not rise everywhere: taken as even steps of {step:.6g} s"
-        return np.asarray(first + step * np.arange(count)), (note,)
+        return _even_by_time(count, time_s)
     if stamp_s is None or np.count_nonzero(np.isfinite(stamp_s)) < 2:
         raise BadInput("no sampling times; expected a time, stamps, or a sampling rate")
     start, stamp = _block_starts(stamp_s)

@@ -23,7 +23,7 @@ from math import inf, log
 import numpy as np
 
 from sensorgen.core.errors import BadInput, UnknownName
-from sensorgen.measure.recording.offset import relaxation
+from sensorgen.measure.recording.rig import relaxation
 from sensorgen.measure.recording.samples import Bools, Complex, Real
 
 BIN_S = 0.25  # beyond the demodulator's own memory, so that bins are independent of each other

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording.offset import principal_component
+from sensorgen.measure.recording.rig import principal_component
 from sensorgen.measure.recording.samples import Bools, Complex, Real
 
 THRESHOLD_N = 0.2

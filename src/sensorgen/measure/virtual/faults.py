@@ -137,6 +137,14 @@ class FaultSchedule:
 
     def update(self, time_s: float, force_n: float) -> None:
         """Let faults begin and end that are due [s], [N]."""
+        self._begin(time_s, force_n)
+        for end_s, fault in [(t, f) for t, f in self._lasting if time_s >= t]:
+            self._lasting.remove((end_s, fault))
+            target = self._targets.get(fault.strikes)
+            if target and target.fault == fault.sets:
+                target.fault = ""
+
+    def _begin(self, time_s: float, force_n: float) -> None:
         for one in [p for p in self._waiting if self._due(p, time_s, force_n)]:
             self._waiting.remove(one)
             fault = FAULTS[one.what]
@@ -144,11 +152,6 @@ class FaultSchedule:
                 self._targets[fault.strikes].fault = fault.sets
             if one.for_s is not None:
                 self._lasting.append((time_s + one.for_s, fault))
-        for end_s, fault in [(t, f) for t, f in self._lasting if time_s >= t]:
-            self._lasting.remove((end_s, fault))
-            target = self._targets.get(fault.strikes)
-            if target and target.fault == fault.sets:
-                target.fault = ""
 
     @staticmethod
     def _due(one: Planted, time_s: float, force_n: float) -> bool:

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
+from sensorgen.measure.lab.devices import Clock, DeviceFault, Identity, Readings, WrongDevice
 from sensorgen.measure.signal.waveform import multisine
 from sensorgen.measure.virtual.plant import Plant
 
@@ -148,20 +147,25 @@ class PhasorMeter:
         samples = np.hypot(np.hypot(INPUT_LSB, 1 / np.sqrt(12)) * steps, [0.0, analyser.output_noise_v()])
         self._deviation_v, self._limit_v = samples * np.sqrt(2 / (WINDOW_S * RATE_HZ)), ranges[1]
 
+    def _due(self, windows: Windows, now: float) -> tuple[int, int]:
+        """Windows to measure, and those that are lost; raises what a fault makes of it."""
+        if self.fault in _ENDS:
+            raise DeviceFault(_ENDS[self.fault])
+        if self.fault == "hung" and now - self._heard > _TIMEOUT_S:
+            raise DeviceFault(f"no samples from Handyscope {SERIAL} for {now - self._heard:.1f} s")
+        loses = self.fault == "data loss"
+        self._losses = self._losses + 1 if loses else 0
+        if self._losses > _LOSSES:
+            raise DeviceFault(f"Handyscope {SERIAL} loses samples again and again")
+        count = 0 if self.fault == "hung" else windows.due()
+        return (0, count) if loses else (count, 0)
+
     def read(self) -> Readings:
         """The windows that have ended since the last call."""
         if self._windows is None:
             raise DeviceFault(f"Handyscope {SERIAL} does not measure; start it first")
         now = self._clock.now()
-        if self.fault in _ENDS:
-            raise DeviceFault(_ENDS[self.fault])
-        if self.fault == "hung" and now - self._heard > _TIMEOUT_S:
-            raise DeviceFault(f"no samples from Handyscope {SERIAL} for {now - self._heard:.1f} s")
-        count = 0 if self.fault == "hung" else self._windows.due()
-        lost, count = (count, 0) if self.fault == "data loss" else (0, count)
-        self._losses = self._losses + 1 if self.fault == "data loss" else 0
-        if self._losses > _LOSSES:
-            raise DeviceFault(f"Handyscope {SERIAL} loses samples again and again")
+        count, lost = self._due(self._windows, now)
         self._windows.count += lost
         first = self._windows.count
         windows = [self._measured(self._windows.impedance(self._tones)) for _ in range(count)]

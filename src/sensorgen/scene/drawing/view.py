@@ -208,6 +208,15 @@ def _flats(view: View) -> list[Measure]:
     return [Measure(low, high, (z, z)) for low, high, z in flats if low > SAME_MM and high < view.end_mm - SAME_MM]
 
 
+def _gaps(outlines: Sequence[Outline], others: Sequence[Outline]) -> Iterator[Gap]:
+    """From corners and middles of sides of some outlines to the sides of others."""
+    edges = [edge for outline in others for edge in sides(outline)]
+    for a, b in chain.from_iterable(map(sides, outlines)):
+        between = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
+        for place, at_corner in ((a, True), (between, False)):
+            yield from (Gap(place, _foot(place, *edge), at_corner) for edge in edges)
+
+
 def nearest(view: View) -> Gap | None:
     """Where two terminals come nearest; of several such places the one nearest to the middle.
 
@@ -220,13 +229,7 @@ def nearest(view: View) -> Gap | None:
     for body, outline in view.regions:
         if body.terminal:
             terminals.setdefault(body.terminal, []).append(outline)
-    gaps = []
-    for corners, others in permutations(terminals.values(), 2):
-        edges = [edge for outline in others for edge in sides(outline)]
-        for a, b in (side for outline in corners for side in sides(outline)):
-            between = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
-            for place, at_corner in ((a, True), (between, False)):
-                gaps += [Gap(place, _foot(place, *edge), at_corner) for edge in edges]
+    gaps = chain.from_iterable(_gaps(*pair) for pair in permutations(terminals.values(), 2))
     return min(gaps, key=lambda gap: (round(gap.value_mm, 6), gap.at_corner, abs(gap.near[0] - middle)), default=None)
 
 

@@ -108,6 +108,15 @@ def _body(shape: Any, name: str, colour: Any, chord_mm: float) -> "FileBody":
     )  # fmt: skip
 
 
+def _corner(edge: Any, axis_mm: float, *, arc: bool) -> tuple[tuple[float, float], float]:
+    """Radius and height at which an edge of a profile begins [mm], and its bulge."""
+    ends = [(point.X - axis_mm, point.Z) for point in (edge.position_at(k) for k in (0.0, 0.5, 1.0))]
+    (ra, za), (rm, zm), (rb, zb) = ends
+    chord = (rb - ra) ** 2 + (zb - za) ** 2
+    beside = (rb - ra) * (zm - za) - (zb - za) * (rm - ra)
+    return (abs(round(ra, 9)), round(za, 9)), -2 * beside / chord if arc and chord > 0 else 0.0
+
+
 def _revolved(shape: Any) -> "Revolved | None":
     """A part as a body of revolution about an upright axis, where its profile of lines and arcs says that it is one."""
     from build123d import Face, GeomType, Plane, Pos
@@ -124,18 +133,14 @@ def _revolved(shape: Any) -> "Revolved | None":
     faces = cut.faces() if cut is not None else []
     if len(faces) != 1 or faces[0].inner_wires():
         return None
-    outline, bulges = [], []
-    for edge in faces[0].outer_wire().order_edges():
-        if edge.geom_type not in (GeomType.LINE, GeomType.CIRCLE):
-            return None
-        ends = [(point.X - middle.X, point.Z) for point in (edge.position_at(k) for k in (0.0, 0.5, 1.0))]
-        (ra, za), (rm, zm), (rb, zb) = ends
-        chord = (rb - ra) ** 2 + (zb - za) ** 2
-        beside = (rb - ra) * (zm - za) - (zb - za) * (rm - ra)
-        outline.append((abs(round(ra, 9)), round(za, 9)))
-        bulges.append(-2 * beside / chord if edge.geom_type == GeomType.CIRCLE and chord > 0 else 0.0)
+    edges = faces[0].outer_wire().order_edges()
+    if any(edge.geom_type not in (GeomType.LINE, GeomType.CIRCLE) for edge in edges):
+        return None
+    outline, bulges = zip(
+        *(_corner(edge, middle.X, arc=edge.geom_type == GeomType.CIRCLE) for edge in edges), strict=True
+    )
     try:
-        piece = Revolved(middle.X, middle.Y, tuple(outline), tuple(bulges))
+        piece = Revolved(middle.X, middle.Y, outline, bulges)
     except SensorgenError:
         return None
     exact = shape.solids()[0].volume

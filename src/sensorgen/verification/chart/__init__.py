@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from types import ModuleType
 
 from sensorgen import models
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.verification.chart import blocks, cells, lines, membrane, networks, presses, readback, rounds, whole
 from sensorgen.verification.chart.measured import ChartPoint, SilentModel, with_front
 

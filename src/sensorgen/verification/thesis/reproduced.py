@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sensorgen.core import plugins as registry
+from sensorgen.core import lazy as registry
 from sensorgen.core.errors import MissingValue, SensorgenError
 from sensorgen.verification.thesis import checks
 from sensorgen.verification.thesis.items import CHAPTERS, Kind, ThesisItem, chapter

@@ -12,7 +12,7 @@ from sensorgen.core.errors import MissingValue
 from sensorgen.core.findings import Finding
 from sensorgen.core.units import si
 from sensorgen.design import materials
-from sensorgen.export.gcode.check import Checked
+from sensorgen.export.gcode.results import Checked
 from sensorgen.prediction.results import Prediction
 from sensorgen.workflows.batch.layout import Plate, Rect
 from sensorgen.workflows.batch.plan import Bake, BatchPlan, Filament, Layout, PrintPiece

@@ -30,7 +30,7 @@ from sensorgen.design.tower import tower
 from sensorgen.export import threemf
 from sensorgen.export.slicers import prusa
 from sensorgen.export.slicers.loads import loads
-from sensorgen.export.threemf.part import part_of
+from sensorgen.export.threemf.core import part_of
 from sensorgen.scene.drawing import paper
 from sensorgen.scene.geometry import meshes
 from sensorgen.scene.scene import Body, Prism, box

@@ -1,16 +1,19 @@
-"""Layers of a print as closed surfaces and as voxels, for other programs."""
+"""Layers of a print as closed surfaces and as voxels, and voxels as VTU for ParaView and finite-element programs."""
 
-from collections.abc import Iterable, Sequence
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from pathlib import Path
 
 import numpy as np
 import shapely
 
 from sensorgen.core.arrays import Real, Whole
-from sensorgen.core.errors import OutOfRange
+from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.layers import LayerRegions, is_rectilinear
+from sensorgen.scene.scene import Body
 
 GRID_MM = 1e-3  # of corners in plan, as in G-code; edges nearer than this are one
 MOST_VOXELS = 4_000_000  # 1 GB of memory while they are written
@@ -108,3 +111,50 @@ def _split(at_mm: Real, pitch_mm: float) -> Real:
     step = np.repeat(np.diff(at_mm) / more, more)
     within = np.arange(len(starts)) - np.repeat(np.cumsum(more) - more, more)
     return np.append(starts + within * step, at_mm[-1])
+
+
+TERMINALS = {"bottom": 1, "top": 2}
+
+
+def content(voxels: Voxels, bodies: Sequence[Body], permittivity: Mapping[str, float]) -> bytes:
+    """The file: hexahedra in mm, air among them, with five numbers each.
+
+    ``body``: from 1 in the order of the bodies, 0 for air. ``material``: from 1 in the order of the materials' names,
+    0 for air. ``terminal``: 1 bottom, 2 top electrode, else 0. ``relative_permittivity``: not a number in conductors.
+
+    Parameters
+    ----------
+    voxels : Voxels
+        Of the print.
+    bodies : sequence of Body
+        Whose numbers they have.
+    permittivity : mapping of str to float
+        Relative, of every dielectric and of "air" [-].
+
+    Raises
+    ------
+    MissingValue
+        meshio is not installed.
+    """
+    try:
+        import meshio
+    except ImportError:
+        raise MissingValue("VTU needs meshio: pip install 'sensorgen[mesh]', or write .3mf, .stl or .step") from None
+    shape = np.array([len(line) for line in voxels.lines_mm])
+    nodes = np.arange(shape.prod()).reshape(shape)
+    low, high = slice(None, -1), slice(1, None)
+    ring = ((low, low), (high, low), (high, high), (low, high))
+    corners = [nodes[x, y, z].ravel() for z in (low, high) for x, y in ring]
+    points = np.stack(np.meshgrid(*voxels.lines_mm, indexing="ij"), axis=-1).reshape(-1, 3)
+    names = ["air", *sorted({body.material for body in bodies})]
+    table = [(0, 0, 0, permittivity["air"])] + [
+        (n, names.index(body.material), TERMINALS.get(body.terminal, 0), permittivity.get(body.material, np.nan))
+        for n, body in enumerate(bodies, 1)
+    ]
+    columns = zip(("body", "material", "terminal", "relative_permittivity"), zip(*table, strict=True), strict=True)
+    data = {name: [np.array(column)[voxels.body.ravel() + 1]] for name, column in columns}
+    mesh = meshio.Mesh(points, [("hexahedron", np.stack(corners, axis=1))], cell_data=data)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "voxels.vtu"
+        meshio.vtu.write(path, mesh)
+        return path.read_bytes()
