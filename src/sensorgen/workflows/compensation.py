@@ -273,12 +273,12 @@ class CompensationSearch(Nearest):
         return min(self.prints or (one for one in self.estimates if not one.discarded), key=distance)
 
     def order(self, one: Candidate) -> tuple[float, ...]:
-        """Distance, with what the capacitance was off before; of a width that it leads to, half way from there."""
+        """Distance and half of what the capacitance was off before; of a width that it leads to, half way from there."""
         far, done = super().order(one)
         off = self._capacitance_off(one.before) if one.before else None
         if one.before and off is not None and self._width(one):
             far = (far + one.before.distance) / 2
-        return far + abs(off or 0.0), done
+        return far + abs(off or 0.0) / 2, done
 
     def is_over(self) -> bool:
         """Test whether the wanted print, or nothing after many tries, was found."""
