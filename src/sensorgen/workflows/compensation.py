@@ -273,7 +273,7 @@ class CompensationSearch(Nearest):
         return min(self.prints or (one for one in self.estimates if not one.discarded), key=distance)
 
     def order(self, one: Candidate) -> tuple[float, ...]:
-        """Distance and half of what the capacitance was off before; of a width that it leads to, half way from there."""
+        """Distance and half of what the capacitance was off before; half way of a width that it leads to."""
         far, done = super().order(one)
         off = self._capacitance_off(one.before) if one.before else None
         if one.before and off is not None and self._width(one):
