@@ -101,14 +101,15 @@ def build_command(
 
     if verify:
         return _verify(design, out / design.name)
+    asked = design
     design, changes = body_options.compensated(design, compensate, design.walls)
     kind, budget_s = DetailedBuild if details else Built, advising.budget if advise or advising.apply else None
 
     try:
         with render.progress(STEPS) as step:
             built = build(
-                design, out, cad=not no_cad, force=force, strict=strict, compensated=changes, budget_s=budget_s,
-                step=step, decided=lambda built: _shown(kind(**vars(built))),
+                design, out, cad=not no_cad, force=force, strict=strict, compensated=changes, asked=asked,
+                budget_s=budget_s, step=step, decided=lambda built: _shown(kind(**vars(built))),
             )  # fmt: skip
     except Unprintable as error:
         return _refuse(design, error, budget_s, advising)

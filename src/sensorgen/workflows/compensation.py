@@ -29,6 +29,10 @@ GAP, CAPACITANCE, STIFFNESS = "gap_mm", "capacitance_pf", "stiffness_kpa_per_mm"
 UNITS = {GAP: "mm", CAPACITANCE: "pF", STIFFNESS: "kPa/mm"}
 WITHIN = {GAP: 0.03, CAPACITANCE: 0.02, STIFFNESS: 0.1}  # relative errors; whole layers leave few stiffnesses
 ESTIMATE_WITHIN = WITHIN | {CAPACITANCE: 0.01}  # of a changed design before it is sliced
+NOT_COMPARED = (
+    "aimed at these alone: the print may sense force and position worse than that of what was asked for; build that, "
+    "then this again, to compare"
+)
 PERIOD = ("parameters", "period_mm")
 PRESSURE_PA = 80e3  # 8 N on 10 x 10 mm: under which a stiffness is meant
 FARTHEST = 2.0  # distance of a change, as of moves.distance [-]
@@ -67,11 +71,12 @@ class Adjustment:
     why: str
 
 
-def document(changes: Sequence[Adjustment]) -> Iterator[Part]:
-    """Changes, if any."""
+def document(changes: Sequence[Adjustment], compared: str = NOT_COMPARED) -> Iterator[Part]:
+    """Changes, if any, and their effect on what the sensor is for."""
     if changes:
         yield "compensated for the print:"
         yield Facts(tuple((f"  {c.what}", f"{c.before:.4g} -> {c.after:.4g}: {c.why}") for c in changes))
+        yield compared
         yield ""
 
 
