@@ -211,7 +211,7 @@ def build(
 
 def _compared(asked: Design | None, now: Trial | None) -> str:
     """Effect of a compensation on the resolutions, as far as the print of what was asked for is predicted."""
-    if not (asked and now):
+    if not (asked and now and _is_known(asked)):
         return compensation.NOT_COMPARED
     try:
         with only_known():
