@@ -109,7 +109,8 @@ def build_command(
         with render.progress(STEPS) as step:
             built = build(
                 design, out, cad=not no_cad, force=force, strict=strict, compensated=changes,
-                asked=asked if changes else None, budget_s=budget_s, step=step, decided=lambda built: _shown(kind(**vars(built))),
+                asked=asked if changes else None, budget_s=budget_s, step=step,
+                decided=lambda built: _shown(kind(**vars(built))),
             )  # fmt: skip
     except Unprintable as error:
         return _refuse(design, error, budget_s, advising)
