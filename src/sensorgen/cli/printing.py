@@ -129,7 +129,7 @@ def _refuse(design: "Design", error: Unprintable, budget_s: float | None, advisi
 
     with render.progress(STEPS) as step:
         advice = decision(design, reviewed(design), budget_s, predict=bool(budget_s), step=step).advice
-    render.deliver(RefusedBuild(design.name, tuple(error.findings), len(error.stopping), advice=advice))
+    render.deliver(RefusedBuild(design.name, tuple(error.findings), len(error.stopping), error.source, advice=advice))
     advising.write(design, advice)
     if advising.apply is None:
         raise error

@@ -179,7 +179,7 @@ def build(
             ahead.append(lane.submit(_predict, [(design.crossing,)]))  # beside slicing and checks of the whole array
         review = reviewed(design, step, folder=folder)
         if review.errors(strict) and not force:
-            raise Unprintable(review.findings, review.errors(strict))
+            raise Unprintable(review.findings, review.errors(strict), review.source)
         review = review.with_meshes(design)
         stage = stack.enter_context(store.staging(folder))
         job = None
