@@ -344,9 +344,10 @@ class CompensationSearch(Nearest):
         return quantities(moves.changed(self.base, one.values), by_rules, stiffness=stiffness)
 
     def _checked(self, one: Candidate) -> Quantities:
-        """Those of its estimate, where no rule refuses the whole of it that lets the first design pass."""
-        errors = review(moves.changed(self.base, one.values), walls=self.walls).errors() if one.values else []
-        passed = {f.rule for f in review(self.base, walls=self.walls).errors()} if errors else set()
+        """Those of its estimate, where no rule refuses it that lets the first design pass: of an array, a few cells."""
+        cut = moves.short if hasattr(self.base.params, "fitting") else moves.changed  # cells of arrays are whole
+        errors = review(cut(self.base, one.values), walls=self.walls).errors() if one.values else []
+        passed = {f.rule for f in review(cut(self.base, {}), walls=self.walls).errors()} if errors else set()
         one.discard(next((f"{f.rule}, {f.message}" for f in errors if f.rule not in passed), ""))
         return self.estimates[one]
 
