@@ -154,6 +154,17 @@ def test_a_period_that_leaves_an_island_in_the_air_becomes_one_that_fits_the_len
     assert printed == pytest.approx(wanted, rel=0.03)
 
 
+def test_a_cut_period_is_a_length_in_the_plane_and_its_island_goes_too():
+    """The end of 9.09 periods moves up and down with the period, which made it a height; drawn, it has the island."""
+    cut = {"dielectric_mm": 0.2, "length_mm": 30.0, "width_mm": 6.0, "period_mm": 3.3}
+    asked = design.make({"shape": "tri", "parameters": cut})
+    assert ("period_mm", 3.3, False) in list(compensation.moves.lengths(asked))
+    assert [f.rule for f in review(asked).errors()] == ["9-bridge"]
+    made, _ = compensated(asked, "cura-gaps")
+    assert made.params.period_mm != 3.3
+    assert not review(made, walls="cura-gaps").errors()
+
+
 def test_what_rules_refuse_in_whole_periods_too_is_refused_with_the_rule(monkeypatch):
     def with_an_island(design, walls=""):
         island = Finding("9-bridge", "error", "film", "an island starts in mid-air", "")

@@ -344,17 +344,20 @@ class CompensationSearch(Nearest):
         return quantities(moves.changed(self.base, one.values), by_rules, stiffness=stiffness)
 
     def _checked(self, one: Candidate) -> Quantities:
-        """Those of its estimate, where no rule refuses it that lets the first design pass: of an array, a few cells."""
-        cut = moves.short if hasattr(self.base.params, "fitting") else moves.changed  # cells of arrays are whole
+        """Those of its estimate, where no rule refuses it that lets whole periods of the first design pass.
+
+        Of an array, whose cells are whole, a few are looked at.
+        """
+        cut = moves.short if hasattr(self.base.params, "fitting") else moves.changed
         errors = review(cut(self.base, one.values), walls=self.walls).errors() if one.values else []
-        passed = {f.rule for f in review(cut(self.base, {}), walls=self.walls).errors()} if errors else set()
+        passed = {f.rule for f in review(moves.short(self.base), walls=self.walls).errors()} if errors else set()
         one.discard(next((f"{f.rule}, {f.message}" for f in errors if f.rule not in passed), ""))
         return self.estimates[one]
 
     def _in_whole_periods(self, one: Candidate) -> Iterator[Candidate]:
         """A candidate with whole numbers of periods along a side: the rest of one at the end may be a sliver in air."""
-        for side_mm in (self.base.params.length_mm, self.base.params.width_mm):
-            count = side_mm / float(one.values.get(PERIOD, inf))
+        for side_mm in (self.base.params.length_mm, self.base.params.width_mm) if PERIOD in self.widths else ():
+            count = side_mm / float(one.values.get(PERIOD, _own(self.base, PERIOD)))
             for whole in {floor(count), ceil(count)} - {0}:
                 if abs(log(count / whole)) < _LEAST_STEP:
                     yield from self.changed({**one.values, PERIOD: side_mm / whole}, one)
