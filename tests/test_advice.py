@@ -1,6 +1,7 @@
 """Changes that are tried: the nearest that removes findings, checked again by hand, and written into the file."""
 
-import time
+import subprocess
+import sys
 from dataclasses import replace
 from math import log
 from pathlib import Path
@@ -137,10 +138,35 @@ def test_extremes_are_words(error, words):
 def test_a_change_that_is_not_needed_is_dropped(plate):
     """Planted: the whole layer that removes the warnings, with a length and a width that do nothing."""
     design, made, _ = plate
-    search = AdviceSearch(design, made, 1e9, lambda _: None, time.process_time())
+    search = AdviceSearch(design, made, 1e9, lambda _: None, 0.0)
     idle = {("parameters", "length_mm"): 27.0, ("parameters", "width_mm"): 9.0}
     search.run(search.changed(idle | {("parameters", "dielectric_mm"): 0.6}))
     assert [one.values for one in search.nearest] == [{("parameters", "dielectric_mm"): 0.6}]
+
+
+BURN = "import time\nwhile time.process_time() < 0.2: pass"
+
+
+def test_the_time_of_slicers_counts(plate, monkeypatch):
+    """Each review takes 0.2 s of another program, and hardly any of this one."""
+    design, made, _ = plate
+
+    def by_another(search, one):
+        subprocess.run([sys.executable, "-I", "-S", "-c", BURN], check=True)
+        search.checked += 1
+        return list(made.findings)
+
+    monkeypatch.setattr(AdviceSearch, "_reviewed", by_another)
+    advice = advise(design, made, 0.5)
+    assert 1 <= advice.checked <= 3
+    assert 0.5 <= advice.seconds < 1.0
+
+
+def test_a_prediction_that_would_outrun_the_budget_is_not_begun(plate):
+    """Of the longest so far: here the design's own, of a minute."""
+    design, made, _ = plate
+    assert not advise(design, made, 1e9, spent_s=0.6e9).predicted
+    assert advise(design, made, 1e9, spent_s=0.4e9).predicted
 
 
 def test_seven_layers_of_one_sentence_are_one_finding():

@@ -12,6 +12,7 @@ from click import ClickException
 from click.testing import CliRunner
 
 from sensorgen.core.errors import OutOfRange, SensorgenError
+from sensorgen.core.parallel import used_s
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.design import make
 from sensorgen.design.shapes import tri
@@ -21,7 +22,7 @@ from sensorgen.prediction.query import Query
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.line.inputs import read
 from sensorgen.verification import line_models, peers
-from sensorgen.verification.apart import apart, measured, used_s
+from sensorgen.verification.apart import apart, measured
 from sensorgen.verification.chart import cells, lines
 from sensorgen.verification.chart_command import command
 from sensorgen.verification.design_chart import results, works

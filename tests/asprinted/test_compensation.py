@@ -3,7 +3,9 @@
 import pytest
 
 from sensorgen.asprinted.printed import body, gap_mm, nominal
+from sensorgen.checks.review import Review, review
 from sensorgen.core.errors import OutOfRange
+from sensorgen.core.findings import Finding
 from sensorgen.design import design
 from sensorgen.prediction.bodies import drawn, estimated, sliced
 from sensorgen.prediction.rest_state import rest_state
@@ -133,6 +135,45 @@ def test_the_bake_is_printed_against_once():
     assert made.printed.size_mm[:2] == pytest.approx((125.0, 12.5))
     own, changes = compensated(design.make({"shape": "reference", "shrinkage": 0.1}), bake=True)
     assert (own.shrinkage, changes) == (0.1, [])
+
+
+def taller(design, kinds):
+    """Of all heights one layer more of the hanging prisms."""
+    return [(("parameters", "hang_height_mm"), 0.536)]
+
+
+def test_a_period_that_leaves_an_island_in_the_air_becomes_one_that_fits_the_length(monkeypatch):
+    """The nearest, of 4.422 mm, leaves 0.16 mm of a hanging prism at the end of 100 mm."""
+    monkeypatch.setattr(compensation.moves, "steps", taller)
+    asked = design.make({"shape": "tri", "quality": "extrafine", "parameters": {"dielectric_mm": 0.2}})
+    made, _ = compensated(asked)
+    periods = made.params.length_mm / made.params.period_mm
+    assert periods == pytest.approx(round(periods), abs=1e-9)
+    assert not review(made).errors()
+    wanted, printed = (rest_state(each).capacitance.value for each in (drawn(asked), estimated(made, "arachne")))
+    assert printed == pytest.approx(wanted, rel=0.03)
+
+
+def test_a_cut_period_is_a_length_in_the_plane_and_its_island_goes_too():
+    """The end of 9.09 periods moves up and down with the period, which made it a height; drawn, it has the island."""
+    cut = {"dielectric_mm": 0.2, "length_mm": 30.0, "width_mm": 6.0, "period_mm": 3.3}
+    asked = design.make({"shape": "tri", "parameters": cut})
+    assert ("period_mm", 3.3, False) in list(compensation.moves.lengths(asked))
+    assert [f.rule for f in review(asked).errors()] == ["9-bridge"]
+    made, _ = compensated(asked, "cura-gaps")
+    assert made.params.period_mm != 3.3
+    assert not review(made, walls="cura-gaps").errors()
+
+
+def test_what_rules_refuse_in_whole_periods_too_is_refused_with_the_rule(monkeypatch):
+    def with_an_island(design, walls=""):
+        island = Finding("9-bridge", "error", "film", "an island starts in mid-air", "")
+        return Review({}, [island] * (design.params.period_mm != 2.0))
+
+    monkeypatch.setattr(compensation, "review", with_an_island)
+    monkeypatch.setattr(compensation, "_MOST_SOLVED", 12)
+    with pytest.raises(OutOfRange, match=r"walls without an error \(9-bridge, an island .* mid-air\); nearest: "):
+        compensated(small(parameters=SHORT | {"dielectric_mm": 0.2}))
 
 
 def test_what_needs_no_change_is_left_as_it_is():

@@ -227,6 +227,14 @@ def test_a_cell_that_rounding_made_lopsided_is_its_own_mirror_image():
     assert window.evened(aside, plan) != aside
 
 
+def test_an_evened_cell_reaches_to_its_sides():
+    """A 23rd of 100 mm has more decimals than edges are rounded to: no electrode may begin beside the end."""
+    side = round(100 / 23, 9)
+    given = [strips(0.0, 0.1, (0.0, side)), strips(0.1, 0.2, (0.0, 0.7), (side - 0.7, side))]
+    even = window.evened(given, window.Window((0.0, side), (0.0, 1.0)), 2e-3)
+    assert [edges(layer) for layer in even] == [(0.0, side)] * 2
+
+
 def test_a_layer_that_is_lost_parts_what_is_above_from_what_is_below():
     like = Scene((Body("a", "x60", (box(0, 1, 0, 1, 0, 0.3),)),), (2.0, 1.0, 0.3))
     found = scene_of(

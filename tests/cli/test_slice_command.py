@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shutil
 import signal
 import sys
 import time
@@ -70,6 +72,18 @@ def test_what_cannot_be_printed_is_not_sliced(run, slicer, tmp_path):
     assert said.code == 1
     assert "error" in said.out
     assert not (tmp_path / "out").exists()
+
+
+def test_a_refused_slice_counts_what_the_check_counts(run, monkeypatch):
+    """An island: one error stops it, and the findings of the print count too, with their source."""
+    if shutil.which("prusa-slicer") is None:
+        pytest.skip("prusa-slicer is not installed")
+    monkeypatch.delenv("SENSORGEN_SLICER", raising=False)
+    words = ("tri", "--dielectric", "0.2", "--size", "30x6", "--period", "3.3", "--name", "a")
+    heads = {re.match(r"CHANGE a: 1 error, .*; sliced by PrusaSlicer 2[.0-9]+", run(*command).words)[0] for command in (
+        ("check", *words, "--budget", "0"), ("slice", *words), ("build", *words, "--no-cad"),
+    )}  # fmt: skip
+    assert len(heads) == 1
 
 
 @pytest.mark.parametrize(

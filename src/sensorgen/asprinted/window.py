@@ -195,6 +195,7 @@ def evened(layers: Sequence[LayerRegions], to: Window, within_mm: float = np.inf
             if np.abs(mirrored - bounds).max(initial=0.0) >= 2 * within_mm:
                 return list(layers)
             middle = ((bounds + mirrored - sides) / 2).round(9).round(6) + sides / 2  # alike to both sides
+            middle = np.where((bounds <= 0) | (bounds >= sides), bounds, middle)  # sides have more decimals
             regions[name] = shapely.union_all(shapely.box(*middle.round(9).T))
         even.append(layer.mapped(regions))
     return even

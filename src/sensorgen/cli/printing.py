@@ -101,14 +101,16 @@ def build_command(
 
     if verify:
         return _verify(design, out / design.name)
+    asked = design
     design, changes = body_options.compensated(design, compensate, design.walls)
     kind, budget_s = DetailedBuild if details else Built, advising.budget if advise or advising.apply else None
 
     try:
         with render.progress(STEPS) as step:
             built = build(
-                design, out, cad=not no_cad, force=force, strict=strict, compensated=changes, budget_s=budget_s,
-                step=step, decided=lambda built: _shown(kind(**vars(built))),
+                design, out, cad=not no_cad, force=force, strict=strict, compensated=changes,
+                asked=asked if changes else None, budget_s=budget_s, step=step,
+                decided=lambda built: _shown(kind(**vars(built))),
             )  # fmt: skip
     except Unprintable as error:
         return _refuse(design, error, budget_s, advising)
@@ -127,7 +129,7 @@ def _refuse(design: "Design", error: Unprintable, budget_s: float | None, advisi
 
     with render.progress(STEPS) as step:
         advice = decision(design, reviewed(design), budget_s, predict=bool(budget_s), step=step).advice
-    render.deliver(RefusedBuild(design.name, tuple(error.findings), len(error.stopping), advice=advice))
+    render.deliver(RefusedBuild(design.name, tuple(error.findings), len(error.stopping), error.source, advice=advice))
     advising.write(design, advice)
     if advising.apply is None:
         raise error

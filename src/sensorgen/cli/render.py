@@ -166,7 +166,7 @@ def refused(name: str) -> Iterator[None]:
     except Unprintable as error:
         from sensorgen.core.findings import Refused
 
-        deliver(Refused(name, tuple(error.findings), len(error.stopping)))
+        deliver(Refused(name, tuple(error.findings), len(error.stopping), error.source))
         raise
 
 

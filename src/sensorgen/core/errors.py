@@ -86,8 +86,9 @@ class NotInstalled(MissingValue):
 class Unprintable(SensorgenError):
     """A design whose checks found errors: ``findings`` holds all that they found, the ``stopping`` ones first."""
 
-    def __init__(self, findings: Sequence[Any], stopping: Sequence[Any]) -> None:
-        """Take the findings (see :class:`sensorgen.core.findings.Finding`), and those for which nothing is written."""
+    def __init__(self, findings: Sequence[Any], stopping: Sequence[Any], source: str = "") -> None:
+        """Take findings (:class:`sensorgen.core.findings.Finding`), those that stop, and the print that all are of."""
+        self.source = source
         self.stopping = list(stopping)
         self.findings = [*self.stopping, *(f for f in findings if f not in self.stopping)]
         first = self.stopping[0]

@@ -90,6 +90,8 @@ class Refused:
         All of them.
     stopping : int
         How many of them, the first ones, are why.
+    source : str
+        Slicer and version, or that the print is estimated, and why.
     folder, gcode : None
         Nothing was written.
     """
@@ -97,13 +99,15 @@ class Refused:
     name: str
     findings: tuple[Finding, ...]
     stopping: int
+    source: str = ""
     folder: None = None
     gcode: None = None
 
     def document(self) -> Iterator[Part]:
         """The verdict, and the findings that matter most of those that are why."""
         shown = most_severe(self.findings[: self.stopping], 3)
-        yield f"CHANGE  {self.name}: {counted(counts(self.findings))}"
+        source = self.source and f"; {self.source}"
+        yield f"CHANGE  {self.name}: {counted(counts(self.findings))}{source}"  # warnings, too, where they stop it
         yield ""
         yield from listed(shown)
         if len(self.findings) > len(shown):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import starmap
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from sensorgen.core.errors import BadInput, NotInstalled, SensorgenError
@@ -302,6 +302,16 @@ class _Process(Lane):
         """Another process in place of the dead one."""
         self.executor.shutdown()
         self.executor = _Process().executor
+
+
+def used_s() -> float:
+    """Processor time of this process and of those that it has started and that have ended [s]."""
+    try:
+        from resource import RUSAGE_CHILDREN, getrusage
+    except ImportError:  # Windows has no record of others
+        return process_time()
+    of_others = getrusage(RUSAGE_CHILDREN)
+    return process_time() + of_others.ru_utime + of_others.ru_stime
 
 
 def open_lanes(jobs: int, cluster: str = "") -> "AbstractContextManager[Sequence[Lane]]":

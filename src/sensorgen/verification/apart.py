@@ -17,6 +17,7 @@ from pathlib import Path
 
 from sensorgen.core import cache
 from sensorgen.core.errors import SensorgenError
+from sensorgen.core.parallel import used_s
 
 _MB = 1024  # kB
 
@@ -109,16 +110,6 @@ def measured(work: Work, before_s: float, started: float) -> TimedAnswer:
     before_s, started = used_s(), time.time()
     work()
     return TimedAnswer(answer, cold, Cost(used_s() - before_s, time.time() - started), _peak_mb())
-
-
-def used_s() -> float:
-    """Processor time of this process and of those that it has started [s]."""
-    try:
-        from resource import RUSAGE_CHILDREN, getrusage
-    except ImportError:  # Windows has no record of others
-        return time.process_time()
-    of_others = getrusage(RUSAGE_CHILDREN)
-    return time.process_time() + of_others.ru_utime + of_others.ru_stime
 
 
 def _peak_mb() -> float | None:

@@ -1,7 +1,6 @@
 """Advice that was tried: the nearest changes of a design that remove its findings, each checked and predicted."""
 
 import json
-import time
 from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 from hashlib import sha256
@@ -10,6 +9,7 @@ from typing import Any
 from sensorgen.checks.review import review
 from sensorgen.core import cache as answers
 from sensorgen.core.findings import Finding, verdict
+from sensorgen.core.parallel import used_s
 from sensorgen.core.records import adapter
 from sensorgen.design import best
 from sensorgen.design.design import Design
@@ -71,7 +71,7 @@ def advise(
     spent_s : float
         Of the budget, by the prediction of the design itself [s].
     """
-    search = AdviceSearch(design, now, budget_s, step, time.process_time() - spent_s)
+    search = AdviceSearch(design, now, budget_s, step, spent_s)
     search.run(search.start())
     return search.advice()
 
@@ -79,9 +79,10 @@ def advise(
 class AdviceSearch(Nearest):
     """Changes by distance from a design; those that are better than all nearer ones are kept."""
 
-    def __init__(self, design: Design, now: Trial, budget_s: float, step: Step, start_s: float) -> None:
+    def __init__(self, design: Design, now: Trial, budget_s: float, step: Step, spent_s: float) -> None:
         super().__init__(design, FARTHEST)
-        self.now, self.budget_s, self.step, self.start_s = now, budget_s, step, start_s
+        self.now, self.budget_s, self.step, self.start_s = now, budget_s, step, used_s() - spent_s
+        self.longest_s = spent_s  # of a prediction
         self.kept, self.nearest, self.untried = list[Candidate](), list[Candidate](), list[Candidate]()
         self.checked = self.predicted = 0
 
@@ -99,16 +100,16 @@ class AdviceSearch(Nearest):
         return self.left_s < 0 or self.predicted >= MOST_PREDICTED or (self.checked >= MOST_CHECKED and is_next_new)
 
     def is_wanted(self, one: Candidate) -> bool:
-        """False for a known design whose prediction takes longer than is left."""
+        """False for a design whose prediction takes longer than is left: a known time, or the longest so far."""
         late = one.origin and one.origin.seconds > self.left_s
         if late:
             self.untried.append(one)
-        return not late
+        return not late and (one.stage == 0 or self.longest_s <= self.left_s)
 
     @property
     def left_s(self) -> float:
-        """Processor time that is left [s]."""
-        return self.budget_s + self.start_s - time.process_time()
+        """Processor time that is left, that of slicers counted [s]."""
+        return self.budget_s + self.start_s - used_s()
 
     def work(self, one: Candidate) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         """Review, then prediction; a known design is predicted at once."""
@@ -125,7 +126,10 @@ class AdviceSearch(Nearest):
 
     def _predicted(self, one: Candidate) -> Trial:
         self.predicted += 1
-        return trial(moves.changed(self.base, one.values), drawn=False)
+        start_s = used_s()
+        tried = trial(moves.changed(self.base, one.values), drawn=False)
+        self.longest_s = max(self.longest_s, used_s() - start_s)
+        return tried
 
     @cached_property
     def _is_like_short(self) -> bool:

@@ -32,10 +32,10 @@ from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless, to_json
 from sensorgen.prediction.slices import PrintReview, reviewed
 from sensorgen.workflows import compensation, decision, sealed
-from sensorgen.workflows.changes import Advice
+from sensorgen.workflows.changes import Advice, effects
 from sensorgen.workflows.compensation import Adjustment
 from sensorgen.workflows.decision import Decision
-from sensorgen.workflows.trial import Trial, table
+from sensorgen.workflows.trial import Trial, table, trial
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
 LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
@@ -70,6 +70,8 @@ class Built:
         Changes that were tried; None where none was looked for.
     source : str
         Of the findings: slicer and version, or that the print is estimated, and why.
+    compared : str
+        Effect of the compensation on the resolutions.
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
@@ -85,6 +87,7 @@ class Built:
     trial: Trial | None = None
     advice: Advice | None = None
     source: str = ""
+    compared: str = compensation.NOT_COMPARED
 
     def document(self) -> Iterator[Part]:
         """Verdict, quantities drawn beside printed, and the three findings that matter most."""
@@ -106,7 +109,7 @@ class Built:
             yield f"{self.folder}: {len(self.files)} files; --details prints all, --advise tries changes"
 
     def _head(self) -> Iterator[Part]:
-        yield from compensation.document(self.compensated)
+        yield from compensation.document(self.compensated, self.compared)
         yield headline(self.name, self.findings, self.source)
         yield ""
 
@@ -132,6 +135,7 @@ def build(
     force: bool = False,
     strict: bool = False,
     compensated: Sequence[Adjustment] = (),
+    asked: Design | None = None,
     budget_s: float | None = None,
     step: Step = lambda _: None,
     decided: Callable[[Built], None] = lambda _: None,
@@ -152,6 +156,8 @@ def build(
         Take warnings for errors.
     compensated : sequence of Adjustment
         How the design differs from the one that was asked for, for the record.
+    asked : Design, optional
+        That one: its print's resolutions are compared, where they are stored.
     budget_s : float
         Processor time for trying changes that remove findings [s]; none are tried if not given.
     step : callable
@@ -173,7 +179,7 @@ def build(
             ahead.append(lane.submit(_predict, [(design.crossing,)]))  # beside slicing and checks of the whole array
         review = reviewed(design, step, folder=folder)
         if review.errors(strict) and not force:
-            raise Unprintable(review.findings, review.errors(strict))
+            raise Unprintable(review.findings, review.errors(strict), review.source)
         review = review.with_meshes(design)
         stage = stack.enter_context(store.staging(folder))
         job = None
@@ -188,7 +194,7 @@ def build(
         final = decision.decision(design, review, budget_s, step=step)
         built = Built(
             design.name, folder, (), final.verdict, final.findings, timeless(predicted), tuple(compensated), (),
-            final.trial, final.advice, review.source,
+            final.trial, final.advice, review.source, _compared(asked, final.trial),
         )  # fmt: skip
         decided(built)
         for name, content in _files(design, review, predicted, final, step):
@@ -201,6 +207,18 @@ def build(
         replaced += sealed.set_aside(folder, design)
         step("done")
     return replace(built, files=tuple(sorted([*store.listed(folder), store.MANIFEST])), replaced=replaced)
+
+
+def _compared(asked: Design | None, now: Trial | None) -> str:
+    """Effect of a compensation on the resolutions, as far as the print of what was asked for is predicted."""
+    if not (asked and now and _is_known(asked)):
+        return compensation.NOT_COMPARED
+    try:
+        with only_known():
+            _, words = effects(trial(asked, drawn=False), now)
+    except (Unknown, SensorgenError):
+        return compensation.NOT_COMPARED
+    return f"against the print of what was asked for: {words or 'it senses as that does'}"
 
 
 def _predict(design: Design) -> None:

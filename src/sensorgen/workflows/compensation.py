@@ -7,9 +7,10 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from math import copysign, exp, inf, log, prod
+from math import ceil, copysign, exp, floor, inf, log, prod
 from typing import Any
 
+from sensorgen.checks.review import review
 from sensorgen.checks.widths import GAP_CLOSES
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import OutOfRange, SensorgenError
@@ -28,6 +29,11 @@ GAP, CAPACITANCE, STIFFNESS = "gap_mm", "capacitance_pf", "stiffness_kpa_per_mm"
 UNITS = {GAP: "mm", CAPACITANCE: "pF", STIFFNESS: "kPa/mm"}
 WITHIN = {GAP: 0.03, CAPACITANCE: 0.02, STIFFNESS: 0.1}  # relative errors; whole layers leave few stiffnesses
 ESTIMATE_WITHIN = WITHIN | {CAPACITANCE: 0.01}  # of a changed design before it is sliced
+NOT_COMPARED = (
+    "aimed at these alone: the print may sense force and position worse than that of what was asked for; build that, "
+    "then this again, to compare"
+)
+PERIOD = ("parameters", "period_mm")
 PRESSURE_PA = 80e3  # 8 N on 10 x 10 mm: under which a stiffness is meant
 FARTHEST = 2.0  # distance of a change, as of moves.distance [-]
 MOST_SLICES = 6  # with that of the design as it was
@@ -65,11 +71,12 @@ class Adjustment:
     why: str
 
 
-def document(changes: Sequence[Adjustment]) -> Iterator[Part]:
-    """Changes, if any."""
+def document(changes: Sequence[Adjustment], compared: str = NOT_COMPARED) -> Iterator[Part]:
+    """Changes, if any, and their effect on what the sensor is for."""
     if changes:
         yield "compensated for the print:"
         yield Facts(tuple((f"  {c.what}", f"{c.before:.4g} -> {c.after:.4g}: {c.why}") for c in changes))
+        yield compared
         yield ""
 
 
@@ -126,7 +133,8 @@ def compensated(
         layers = f"{FILM_LAYERS} layers at least, {wanted[GAP]:g} mm at layers of {now.layers.layer_mm:g} mm"
         raise _refused(f": a film has {layers}", design, made, printed, asked)
     if search.best is None:
-        raise _refused(f" of {design.name} by {walls} walls", design, made, printed, asked)
+        reason = next((f" without an error ({one.discarded})" for one in search.estimates if one.discarded), "")
+        raise _refused(f" of {design.name} by {walls} walls{reason}", design, made, printed, asked)
     if not after.values:
         return now, changes
     why = "gap, capacitance and stiffness" if stiffness else "gap and capacitance"
@@ -241,7 +249,8 @@ class CompensationSearch(Nearest):
         self.prints: dict[Candidate, Quantities] = {}
         self.best: Candidate | None = None
         self.pressed = 0
-        self.works = [self._at_rest, *[self._pressed] * (STIFFNESS in wanted), *[self._sliced] * bool(sliced)]
+        self.works = [self._at_rest, self._checked, *[self._sliced] * bool(sliced)]
+        self.works[1:1] = [self._pressed] * (STIFFNESS in wanted)
 
     @property
     def first(self) -> Candidate:
@@ -260,20 +269,21 @@ class CompensationSearch(Nearest):
         return self.prints.get(one) or self.estimates[one]
 
     def nearest(self) -> Candidate:
-        """The design whose print is nearest to the wanted one."""
+        """The design whose print is nearest to the wanted one, of those that no rule refuses."""
 
         def distance(one: Candidate) -> tuple[float, float]:
             gap, *others = (abs(_off(self.quantities(one), self.wanted, key)) for key in UNITS)
             return round(gap, 6), sum(others)
 
-        return min(self.prints or self.estimates, key=distance)
+        return min(self.prints or (one for one in self.estimates if not one.discarded), key=distance)
 
     def order(self, one: Candidate) -> tuple[float, ...]:
-        """Distance; of a width that a capacitance leads to, half way from the design before."""
+        """Distance and half of what the capacitance was off before; half way of a width that it leads to."""
         far, done = super().order(one)
-        if one.before and self._width(one) and self._capacitance_off(one.before) is not None:
+        off = self._capacitance_off(one.before) if one.before else None
+        if one.before and off is not None and self._width(one):
             far = (far + one.before.distance) / 2
-        return far, done
+        return far + abs(off or 0.0) / 2, done
 
     def is_over(self) -> bool:
         """Test whether the wanted print, or nothing after many tries, was found."""
@@ -289,12 +299,16 @@ class CompensationSearch(Nearest):
     def take(self, one: Candidate, answer: Quantities) -> Iterable[Candidate]:
         """Go up with what is as wanted, and with the design as it was; from others on to their neighbours."""
         is_print = self.works[one.stage - 1] == self._sliced
+        is_whole = one.before and one.before.discarded  # of whole periods, of which there are few: no finer steps
+        if one.discarded:
+            return self._in_whole_periods(one)
         if is_print:
             self.prints[one] = answer
             self._correct(one)
         else:
             self.estimates[one] = answer
         aim, within = (self.wanted, WITHIN) if is_print or not one.values else (self.aim, ESTIMATE_WITHIN)
+        within = WITHIN if is_whole else within
         keys = list(aim) if one.stage > 1 else [GAP, CAPACITANCE]
         is_reached = all(abs(_off(answer, aim, key)) <= within[key] for key in keys)
         if one.stage < len(self.works) and (is_reached or not one.values):
@@ -302,7 +316,7 @@ class CompensationSearch(Nearest):
         if is_reached:
             self.best = one
             return ()
-        return self._neighbours(one)
+        return self._neighbours(one) if is_print or not is_whole else ()
 
     def _at_rest(self, one: Candidate) -> Quantities:
         """Gap with the margin, and the capacitance where that is the wanted one; nothing of what cannot be made."""
@@ -328,6 +342,25 @@ class CompensationSearch(Nearest):
         """Quantities of the print of a few periods by the rules of slicers, counted to the whole sensor."""
         by_rules = partial(bodies.estimated, walls=self.walls)
         return quantities(moves.changed(self.base, one.values), by_rules, stiffness=stiffness)
+
+    def _checked(self, one: Candidate) -> Quantities:
+        """Those of its estimate, where no rule refuses it that lets whole periods of the first design pass.
+
+        Of an array, whose cells are whole, a few are looked at.
+        """
+        cut = moves.short if hasattr(self.base.params, "fitting") else moves.changed
+        errors = review(cut(self.base, one.values), walls=self.walls).errors() if one.values else []
+        passed = {f.rule for f in review(moves.short(self.base), walls=self.walls).errors()} if errors else set()
+        one.discard(next((f"{f.rule}, {f.message}" for f in errors if f.rule not in passed), ""))
+        return self.estimates[one]
+
+    def _in_whole_periods(self, one: Candidate) -> Iterator[Candidate]:
+        """A candidate with whole numbers of periods along a side: the rest of one at the end may be a sliver in air."""
+        for side_mm in (self.base.params.length_mm, self.base.params.width_mm) if PERIOD in self.widths else ():
+            count = side_mm / float(one.values.get(PERIOD, _own(self.base, PERIOD)))
+            for whole in {floor(count), ceil(count)} - {0}:
+                if abs(log(count / whole)) < _LEAST_STEP:
+                    yield from self.changed({**one.values, PERIOD: side_mm / whole}, one)
 
     def _sliced(self, one: Candidate) -> Quantities:
         """Those of a real print."""
@@ -362,7 +395,7 @@ class CompensationSearch(Nearest):
         """One layer more or less; of the film at least two, and not above the wanted gap."""
         layer, film = self.base.layers.layer_mm, ("parameters", "dielectric_mm")
         least, most = FILM_LAYERS * layer - SLIVER_MM, self.wanted[GAP] + SLIVER_MM
-        for key, to in moves.steps(moves.changed(self.base, one.values), ("film", "height")):
+        for key, to in moves.steps(moves.short(self.base, one.values, _PERIODS), ("film", "height")):
             if key != film or least <= float(to) <= most:
                 yield from self.changed({**one.values, key: to}, one)
 
@@ -384,7 +417,7 @@ class CompensationSearch(Nearest):
         start, was = self._share(before, key), self._capacitance_off(before)
         if off is None:
             yield share + copysign(_STEP, share - start or self.quantities(one)[GAP] - self.wanted[GAP])
-            yield from () if was is None else (2 * start - share,)
+            yield from () if was is None or self._width(before) else (2 * start - share,)  # led away by the first step
         elif before is one:
             yield share + max(abs(off), _LEAST_STEP)
         elif was is None:

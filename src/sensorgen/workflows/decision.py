@@ -1,6 +1,5 @@
 """Decision to print a design: verdict, the numbers that decide, findings, changes that were tried; and its page."""
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from sensorgen.checks.review import CheckReport, Review, Step, report
 from sensorgen.core.document import Part
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Refused, headline, listed
+from sensorgen.core.parallel import used_s
 from sensorgen.design.design import Design
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
@@ -115,7 +115,7 @@ def decision(
     decided : callable
         Called with verdict and numbers before any change is tried.
     """
-    tried, start_s = None, time.process_time()
+    tried, start_s = None, used_s()
     reason = "" if predict else "checks alone (--budget 0)"
     if predict and held.meshes:
         step("prediction")
@@ -132,7 +132,7 @@ def decision(
     from sensorgen.workflows.advice import advised
 
     step("changes")
-    return replace(result, advice=advised(design, tried, budget_s, step, time.process_time() - start_s))
+    return replace(result, advice=advised(design, tried, budget_s, step, used_s() - start_s))
 
 
 PAGE_STEPS = (*CHECKS, "prediction", "page", "done")

@@ -196,7 +196,11 @@ def _beside(name: str, value: float, step: float) -> list[tuple[Key, float]]:
 
 
 def lengths(design: Design) -> Iterator[tuple[str, float, bool]]:
-    """The shape's own lengths that are not 0, and whether a face moves up or down with them."""
+    """The shape's own lengths that are not 0, and whether a face moves up or down with them.
+
+    Of two whole periods: the end of a cut one moves up and down with the period.
+    """
+    design = short(design, periods=2)
     drawn = levels(design)
     for name, value in asdict(design.params).items():
         if not isinstance(value, float) or not value or not name.endswith("_mm") or name in ("length_mm", "width_mm"):

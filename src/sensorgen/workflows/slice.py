@@ -10,7 +10,7 @@ from sensorgen.checks.review import review
 from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
-from sensorgen.core.errors import Unprintable
+from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.findings import Finding, Verdict, headline, listed
 from sensorgen.design.design import Design
 from sensorgen.design.walls import rule
@@ -18,8 +18,8 @@ from sensorgen.export.gcode.results import FileNeeds
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step
 from sensorgen.prediction.new_slice import SliceReport, slice_now
-from sensorgen.prediction.print_files import PrintFile
-from sensorgen.prediction.slices import combined, estimated, of_own_machine
+from sensorgen.prediction.print_files import NONE, PrintFile
+from sensorgen.prediction.slices import PrintReview, combined, of_own_machine, reviewed
 from sensorgen.workflows import compensation
 from sensorgen.workflows.compensation import Adjustment
 
@@ -107,8 +107,8 @@ def slice_design(
     step("checks")
     drawn = review(design, walls=rule(slicer, design.walls) if slicer in SLICERS else "")
     if (drawn.errors(strict) or of_own_machine(design)) and not force:
-        whole = estimated(design, drawn)
-        raise Unprintable(whole.findings, whole.errors(strict))
+        whole = _reviewed(design, slicer, program)
+        raise Unprintable(whole.findings, whole.errors(strict), whole.source)
     sliced = slice_now(design, slicer, program=program, time_limit_s=time_limit_s, strict=strict, step=step)
     report = sliced.report
     whole = combined(design, drawn, report.slicer.words, report.of_print(), PrintFile(sliced.record(), sliced.content))
@@ -126,6 +126,14 @@ def slice_design(
         compensated=tuple(compensated),
     )  # fmt: skip
     return _written(result, out / design.name, sliced.content, page, others)
+
+
+def _reviewed(design: Design, slicer: str, program: str) -> PrintReview:
+    """All findings as the other commands have them: by this slicer where it slices."""
+    try:
+        return reviewed(design, slicer="" if program else slicer)
+    except SensorgenError:
+        return reviewed(design, slicer=NONE)
 
 
 def _written(result: SlicedFile, folder: Path, content: bytes, page: str, others: tuple[str, ...]) -> SlicedFile:

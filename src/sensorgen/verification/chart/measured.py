@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.verification.apart import used_s
+from sensorgen.core.parallel import used_s
 
 _QUICK_S = 0.3  # runs shorter than this are repeated, and the median counts
 _REPEATS = 5
