@@ -121,7 +121,9 @@ def _near(mesh: Mesh) -> Mesh:
     one, other = shapely.STRtree(plans).query(plans)
     shared = np.minimum(high[one], high[other]) - np.maximum(low[one], low[other])
     near = np.isin(label, label[order][starts][one[(shared > OVERLAP_MM).all(1) & (one != other)]])
-    return Mesh(mesh.vertices_mm[near], (np.cumsum(near) - 1)[mesh.triangles[near[mesh.triangles[:, 0]]]].astype(np.int32))
+    return Mesh(
+        mesh.vertices_mm[near], (np.cumsum(near) - 1)[mesh.triangles[near[mesh.triangles[:, 0]]]].astype(np.int32)
+    )
 
 
 def _overlaps(solids: Mapping[str, "manifold3d.Manifold"], off_mm: Mapping[str, float]) -> list[tuple[str, str]]:
