@@ -185,17 +185,17 @@ def lots(path: str, shape: tuple[int, int], frequency_hz: float | None) -> Itera
     """Frames of a table as they come, lot by lot; "-" is the standard input. Parameters and errors as :func:`read`."""
     with csv_table.opened(path) as table, within(table.name):
         names = table.names
-        crossings = _crossings(names, shape)
+        places = crossings(names, shape)
         beside = [name for name in names if name in _BESIDE]
-        unused = tuple(sorted({*names} - {*crossings, *_BESIDE, "rest", ""}))
+        unused = tuple(sorted({*names} - {*places, *_BESIDE, "rest", ""}))
         _refuse_times(unused)
-        numbers = [names.index(name) for name in (*crossings, *beside)]
+        numbers = [names.index(name) for name in (*places, *beside)]
         rest = [k for k, name in enumerate(names) if name == "rest"]
         last = np.empty(0)
         for block in table.blocks(numbers, rest):
             values = np.full((len(block.rows), *shape), np.nan)
-            values[:, *np.transpose(list(crossings.values()))] = block.numbers[:, : len(crossings)]
-            found = dict(zip(beside, block.numbers[:, len(crossings) :].T, strict=True)) | {"capacitance_f": values}
+            values[:, *np.transpose(list(places.values()))] = block.numbers[:, : len(places)]
+            found = dict(zip(beside, block.numbers[:, len(places) :].T, strict=True)) | {"capacitance_f": values}
             if rest:
                 found["rest"] = marked([word for (word,) in block.text])
             lot = replace(_checked(found, shape, frequency_hz), unused=unused)
@@ -213,7 +213,7 @@ def marked(words: Sequence[str]) -> Mask:
     return np.array([word.strip().lower() in _TRUE for word in words])
 
 
-def _crossings(names: Sequence[str], shape: tuple[int, int]) -> dict[str, tuple[int, int]]:
+def crossings(names: Sequence[str], shape: tuple[int, int]) -> dict[str, tuple[int, int]]:
     """Row and column of each name of a crossing."""
     found = {name: (int(m[1]) - 1, int(m[2]) - 1) for name in names if (m := _CROSSING.fullmatch(name))}
     refuse_repeated(names, found)

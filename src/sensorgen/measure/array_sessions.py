@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sensorgen.core.arrays import Real
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
 from sensorgen.measure import csv_table
@@ -106,15 +106,28 @@ def refuse_swapped(of: ArraySession, shape: tuple[int, int]) -> None:
         np.stack(np.unravel_index(np.nan_to_num(each[pressed], nan=-np.inf).argmax(1), shape))
         for each in (of.pressure_kpa, of.reading)
     )
-    for letter, own, read_at in zip("rc", true, largest, strict=True):
+    if words := swapped(true, largest):
+        raise BadInput(f"{of.name}: {words}")
+
+
+def swapped(pressed: Whole, largest: Whole) -> str:
+    """Wires that are swapped, by presses that another row or column reads most of the time, in words; or "".
+
+    Parameters
+    ----------
+    pressed, largest : (2, k) array
+        Row and column of each press, and of its largest reading, from 0.
+    """
+    for letter, own, read_at in zip("rc", pressed, largest, strict=True):
         for track in np.unique(own[own != read_at]).tolist():
             at = read_at[own == track]
             other = int(np.bincount(at).argmax())
             if other != track and np.mean(at == other) > _MOST:
-                raise BadInput(
-                    f"{of.name}: presses on {letter}{track + 1} are read at {letter}{other + 1}: wires swapped; "
+                return (
+                    f"presses on {letter}{track + 1} are read at {letter}{other + 1}: wires swapped; "
                     "exchange them, or name the press right"
                 )
+    return ""
 
 
 def _session(
