@@ -10,9 +10,12 @@ import pytest
 
 from no_numbers import unpredicted
 from sensorgen.core import lazy as registry
+from sensorgen.core.cache import only_known
 from sensorgen.core.errors import Unprintable
 from sensorgen.design import design, shapes
 from sensorgen.export.threemf import FAMILIES
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.workflows import build as workflow
 from sensorgen.workflows.build import build
 
 DESIGNS = Path(__file__).parents[1] / "designs"
@@ -156,3 +159,26 @@ def test_all_listed_shapes_build(shape, tmp_path, unpredicted):
     size = dict.fromkeys(("length_mm", "width_mm"), 6.0 if shape == "porous" else 4.0)
     built = build(design.make({"shape": shape, "parameters": size}), tmp_path, cad=False, force=True)
     assert (built.folder / "manifest.json").exists()
+
+
+def test_a_crossing_is_predicted_in_another_process_to_the_same_files(tmp_path, monkeypatch):
+    """With an empty store each: the process leaves nothing to work out here, and changes nothing."""
+    plan = {"length_mm": 10, "width_mm": 10, "pitch_x_mm": 5, "pitch_y_mm": 5, "column_mm": 4, "row_mm": 4}
+    array = design.make({"shape": "array", "name": "a", "parameters": plan, "cell": {"shape": "reference"}})
+    found = []
+    for ahead in (True, False):
+        monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / f"cache-{ahead}"))
+        if ahead:
+            monkeypatch.setattr(workflow, "evaluate", known_only)
+        else:
+            monkeypatch.setattr(workflow, "evaluate", evaluate)
+            monkeypatch.setattr(workflow, "_is_known", lambda _: True)
+        build(array, tmp_path / f"{ahead}", cad=False, force=True)
+        found.append(contents(tmp_path / f"{ahead}"))
+    assert found[0] == found[1]
+    assert found[0]["a/prediction.json"]
+
+
+def known_only(body):
+    with only_known():
+        return evaluate(body)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sensorgen.core import cache as cached
 from sensorgen.core.bounds import Interval
 from sensorgen.design.design import make
 
@@ -160,3 +161,18 @@ def test_an_error_of_second_order_is_stated_a_quarter_larger(monkeypatch):
     found = estimated(0, [0.0, 1e4, 2e4])
     assert found.displacement_error_m == pytest.approx([0.0, 0.25e-6, 0.5e-6])
     assert found.rise_error_f_per_m2 == pytest.approx([0.0, 0.25e-9, 0.5e-9], rel=1e-6, abs=0)
+
+
+def test_a_coarser_mesh_that_is_stored_serves_as_one_that_is_solved(cache):
+    """Stored it has every pressure of the finer mesh; solved for the comparison, one in four."""
+    loads = np.linspace(0.0, 4e4, 10).tolist()
+    fine = mesh_ladder.pressed(case(), loads)
+    solved = mesh_ladder._coarser(case(), fine, loads, 0, keep=False)
+    mesh_ladder.pressed(case(), loads, -1)
+    with cached.only_known():  # else another mesh is solved
+        stored = mesh_ladder._coarser(case(), fine, loads, 0, keep=True)
+    assert stored.stress_pa.tolist() == solved.stress_pa.tolist() == [loads[k] for k in (0, 1, 5, 9)]
+    assert stored.displacement_m == pytest.approx(solved.displacement_m, rel=3e-3)
+    rises = [mesh_ladder._rise(solution)[0] for solution in (stored, solved)]
+    assert rises[0] == pytest.approx(rises[1], rel=5e-3)
+    assert stored.displacement_m[-1] != pytest.approx(fine.displacement_m[-1], rel=3e-3)

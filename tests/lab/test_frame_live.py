@@ -12,7 +12,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.design import load
 from sensorgen.measure.array_frames import read
 from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock
-from sensorgen.measure.lab.frame_live import FrameFeed, MapView, follow, recorder
+from sensorgen.measure.lab.frame_live import FrameFeed, KnownPress, MapView, follow, recorder
 from sensorgen.measure.lab.frame_stream import FrameForm, FrameStream
 from sensorgen.measure.lab.port import SimulatedPort
 from sensorgen.measure.virtual.array import FrameSender, simulated, walked
@@ -256,3 +256,34 @@ def test_frames_of_another_array_are_refused(folder):
         code, _, text = run_all(folder, "bench", "array", "a.yaml", "--port", path, "--no-page", "--seconds", "1")
     assert code == 2
     assert "frames of 2 x 3; expected 5 x 6, as of a" in text
+
+
+@pytest.mark.parametrize(("order", "words"), [
+    ([0, 1, 2, 3, 4, 5], "the press on r2c3 is read there"),
+    ([0, 1, 4, 3, 2, 5], "presses on c3 are read at c5: wires swapped"),
+])  # fmt: skip
+def test_a_known_press_names_swapped_wires(model, order, words):
+    """100 kPa on r2c3, then elsewhere for longer: wires of columns 3 and 5 are exchanged in the readings."""
+    load_kpa = np.zeros((REST + 80, 5, 6))
+    load_kpa[REST + 5 : REST + 30, 1, 2] = 100.0
+    load_kpa[REST + 30 :, 4, 0] = 100.0
+    readout, press = ArrayReadout(frequency_hz=(1e4,)), KnownPress((1, 2))
+    siemens = simulated(model, readout, load_kpa)[:, :, order]
+    rest = np.arange(len(load_kpa)) < REST
+    live = LiveMaps(model, readout)
+    live.take(siemens[rest], np.arange(REST) / 100, rest[rest])
+    for lot in np.array_split(np.arange(REST, len(load_kpa)), 20):
+        press.take(live.take(siemens[lot], lot / 100, rest[lot]))
+        if lot[-1] < REST + 20:
+            assert not press.words()
+    assert press.words().startswith(words)
+
+
+def test_the_command_names_swapped_wires_and_refuses_crossings_that_are_not_there(folder):
+    words = ("--simulate", "--rate", "50", "--unloaded", "2", "--seconds", "1", "--no-page", "--press")
+    code, _, text = run_all(folder, "bench", "array", "a.yaml", *words, "r2c3")
+    assert code == 0
+    assert "no press on r2c3 of 20 frames" in text
+    code, _, text = run_all(folder, "bench", "array", "a.yaml", *words, "r9c3")
+    assert code == 2
+    assert "r9c3; expected r1c1 to r5c6" in text

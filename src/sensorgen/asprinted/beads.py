@@ -243,10 +243,15 @@ def _union(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], conventi
     """All lines with round ends, slits between touching ones closed, each part as large as its lines' deposit."""
     slit = ROUND * layer.height_mm
     columns = (lines.start_mm, lines.end_mm, lines.width_mm[:, None], (lines.volume_mm3 / lines.height_mm)[:, None])
-    plans = _parts(np.hstack(columns).tobytes(), slit)
-    if convention == "stadium":
-        plans = shapely.buffer(plans, slit / 2, join_style="mitre")
-    return shapely.clip_by_rect(shapely.union_all(plans), 0.0, 0.0, size_mm[0], size_mm[1])
+    whole = _whole(np.hstack(columns).tobytes(), slit, slit / 2 if convention == "stadium" else 0.0)
+    return shapely.clip_by_rect(whole, 0.0, 0.0, size_mm[0], size_mm[1])
+
+
+@lru_cache(maxsize=128)
+def _whole(lines: bytes, slit_mm: float, grown_mm: float) -> Region:
+    """Union of the parts of one body's lines in a layer, each grown by some length; arguments as of ``_parts``."""
+    plans = _parts(lines, slit_mm)
+    return shapely.union_all(shapely.buffer(plans, grown_mm, join_style="mitre") if grown_mm else plans)
 
 
 @lru_cache(maxsize=128)

@@ -24,7 +24,7 @@ PITCH_MM = 0.1
 NEAR_MIDDLE = 0.1  # of a layer: slicers may sample a face this near to mid-height on either side
 _MARGIN = 10  # cells around the piece
 _MOST_CELLS = 10_000  # along a line; longer ones are slips
-_LOT = 100_000  # points of lines that are laid at once
+_LOT = 400_000  # points of lines that are laid at once
 _ROWS = 4  # scan lines of a row of cells
 # Volume of a body in a layer over the least and the most that any walls make of it: whole layers, strips, other parts
 # (of tips under two lines wide slicers leave out more), and strips of classic walls, which print whole lines
@@ -159,21 +159,30 @@ def deposit(lines: Beads, shape: tuple[int, ...]) -> Real:
     counts = long * wide
     across = way[:, ::-1] * [-1, 1] * (lines.width_mm / length)[:, None]
     shares, filled = lines.volume_mm3 / lines.height_mm / counts / PITCH_MM**2, np.zeros(shape[0] * shape[1])
-    for lot in np.array_split(
-        np.arange(len(counts)), counts.sum() // _LOT + 1
-    ):  # which a processor's cache has room for
+    along, aside = way / (long * PITCH_MM)[:, None], across / (wide * PITCH_MM)[:, None]
+    corner = (lines.start_mm - across / 2) / PITCH_MM + (along + aside) / 2 + _MARGIN - 0.5
+    for lot in np.array_split(np.arange(len(counts)), counts.sum() // _LOT + 1):
         count = counts[lot]
-        which, step = np.repeat(lot, count), np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        along = ((step // wide[which] + 0.5) / long[which])[:, None]
-        aside = ((step % wide[which] + 0.5) / wide[which] - 0.5)[:, None]
-        place = (lines.start_mm[which] + along * way[which] + aside * across[which]) / PITCH_MM + _MARGIN - 0.5
-        cell = np.floor(place).astype(np.int64)
-        inside = ((cell >= 0) & (cell < np.array(shape) - 1)).all(1)
-        cell, rest, share = cell[inside], (place - cell)[inside], shares[which][inside]
-        for i in (0, 1):
-            for j in (0, 1):
-                weight = share * np.abs(1 - i - rest[:, 0]) * np.abs(1 - j - rest[:, 1])
-                np.add.at(filled, (cell[:, 0] + i) * shape[1] + cell[:, 1] + j, weight)
+        step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        many, share = np.repeat(wide[lot], count), np.repeat(shares[lot], count)
+        row = step // many
+        column = step - row * many
+        x, y = (
+            np.repeat(corner[lot, k], count) + row * np.repeat(along[lot, k], count)
+            + column * np.repeat(aside[lot, k], count)
+            for k in (0, 1)
+        )  # fmt: skip
+        inside = (x >= 0) & (y >= 0) & (x < shape[0] - 1) & (y < shape[1] - 1)
+        if not inside.all():
+            x, y, share = x[inside], y[inside], share[inside]
+        i, j = x.astype(np.int64), y.astype(np.int64)
+        cell, right, up = i * shape[1] + j, share * (x - i), y - j
+        low, left = cell.min(initial=len(filled)), share - right
+        cell -= low
+        for first, weight in ((0, left - left * up), (1, left * up), (shape[1], right - right * up),
+                              (shape[1] + 1, right * up)):  # fmt: skip
+            sums = np.bincount(cell, weight)
+            filled[low + first : low + first + len(sums)] += sums
     return filled.reshape(shape).astype(np.float32)
 
 

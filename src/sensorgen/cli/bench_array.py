@@ -10,7 +10,7 @@ from sensorgen.cli import render
 from sensorgen.cli.bench_recordings import bench
 from sensorgen.cli.designs import of_design
 from sensorgen.cli.options import InputResistance, Readout, refuse_input
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, within
 from sensorgen.core.options import Option
 from sensorgen.prediction.query import Noise
 
@@ -33,7 +33,7 @@ def _array(
     design: "Design", *, port: str = "", kind: str = "frame-stream", simulate: bool = False, rate_hz: float = 100.0,
     faults: tuple[str, ...] = (), record: Path | None = None, unloaded_s: float = 0.0, seconds: float = inf,
     readout: Readout = "guarded", input_ohm: InputResistance = 50.0, noise: Noise, scatter: Scatter = 0.05,
-    calibration: Path | None = None, day: float = nan, page: bool = True,
+    calibration: Path | None = None, day: float = nan, press: str = "", page: bool = True,
 ) -> int:  # fmt: skip
     """Read an array live.
 
@@ -61,12 +61,15 @@ def _array(
         By 'sensorgen calibrate --array'.
     day
         Of the recording, as the calibration counts them.
+    press : r3c2
+        Crossing that is pressed first: wires that are swapped are named.
     page, --page/--no-page
         Show it in the browser.
     """
     from sensorgen.cli.inversion import known
+    from sensorgen.measure.array_frames import crossings
     from sensorgen.measure.lab.devices import RealClock
-    from sensorgen.measure.lab.frame_live import FrameFeed, MapView, follow, recorder
+    from sensorgen.measure.lab.frame_live import PRESS_FRAMES, FrameFeed, KnownPress, MapView, follow, recorder
     from sensorgen.prediction.array.live import LiveMaps
     from sensorgen.prediction.array.model import array_model
     from sensorgen.prediction.array.readout import ArrayReadout
@@ -76,6 +79,8 @@ def _array(
     _refuse_times(seconds, unloaded_s)
     refuse_input(readout)
     model, clock = array_model(design), RealClock()
+    with within("--press"):
+        first = KnownPress(crossings((press,), model.here.shape)[press]) if press else None
     _ = model.regions  # refused before a device is opened
     how = ArrayReadout(readout, input_ohm, (_FREQUENCY_HZ,), noise)  # type: ignore[arg-type]
     meter = _virtual(model, how, rate_hz, faults, clock) if simulate else _device(kind, port, clock)
@@ -97,9 +102,11 @@ def _array(
         stack.callback(feed.stop)
         reader.start()
         with suppress(KeyboardInterrupt):
-            follow(feed, live, view, clock, clock.now() + seconds)
+            follow(feed, live, view, clock, clock.now() + seconds, first)
     counts = ", ".join(f"{count} {name}" for name, count in feed.counts.items())
     by = f"by {live.plan.words()}" if live.tared else "no frame at rest: give --unloaded S, seconds without a load"
+    if first:
+        render.say(first.words() or f"no press on {press} of {PRESS_FRAMES} frames", err=True)
     render.say(f"{counts}, {live.dropped} not inverted; {by}", err=True)
     return 0
 

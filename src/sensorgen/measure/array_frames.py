@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.core.arrays import Complex, Mask, Real, Whole
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
 from sensorgen.core.units import si
@@ -195,17 +195,17 @@ def lots(path: str, shape: tuple[int, int], frequency_hz: float | None) -> Itera
     """Frames of a table as they come, lot by lot; "-" is the standard input. Parameters and errors as :func:`read`."""
     with csv_table.opened(path) as table, within(table.name):
         names = table.names
-        crossings = _crossings(names, shape)
+        places = crossings(names, shape)
         beside = [name for name in names if name in _BESIDE]
-        unused = tuple(sorted({*names} - {*crossings, *_BESIDE, "rest", ""}))
+        unused = tuple(sorted({*names} - {*places, *_BESIDE, "rest", ""}))
         _refuse_times(unused)
-        numbers = [names.index(name) for name in (*crossings, *beside)]
+        numbers = [names.index(name) for name in (*places, *beside)]
         rest = [k for k, name in enumerate(names) if name == "rest"]
         last = np.empty(0)
         for block in table.blocks(numbers, rest):
             values = np.full((len(block.rows), *shape), np.nan)
-            values[:, *np.transpose(list(crossings.values()))] = block.numbers[:, : len(crossings)]
-            found = dict(zip(beside, block.numbers[:, len(crossings) :].T, strict=True)) | {"capacitance_f": values}
+            values[:, *np.transpose(list(places.values()))] = block.numbers[:, : len(places)]
+            found = dict(zip(beside, block.numbers[:, len(places) :].T, strict=True)) | {"capacitance_f": values}
             if rest:
                 found["rest"] = marked([word for (word,) in block.text])
             lot = replace(_checked(found, shape, frequency_hz), unused=unused)
@@ -223,7 +223,7 @@ def marked(words: Sequence[str]) -> Mask:
     return np.array([word.strip().lower() in _TRUE for word in words])
 
 
-def _crossings(names: Sequence[str], shape: tuple[int, int]) -> dict[str, tuple[int, int]]:
+def crossings(names: Sequence[str], shape: tuple[int, int]) -> dict[str, tuple[int, int]]:
     """Row and column of each name of a crossing."""
     found = {name: (int(m[1]) - 1, int(m[2]) - 1) for name in names if (m := _CROSSING.fullmatch(name))}
     refuse_repeated(names, found)
@@ -325,15 +325,28 @@ def refuse_swapped(of: ArraySession, shape: tuple[int, int]) -> None:
         np.stack(np.unravel_index(np.nan_to_num(each[pressed], nan=-np.inf).argmax(1), shape))
         for each in (of.pressure_kpa, of.reading)
     )
-    for letter, own, read_at in zip("rc", true, largest, strict=True):
+    if words := swapped(true, largest):
+        raise BadInput(f"{of.name}: {words}")
+
+
+def swapped(pressed: Whole, largest: Whole) -> str:
+    """Wires that are swapped, by presses that another row or column reads most of the time, in words; or "".
+
+    Parameters
+    ----------
+    pressed, largest : (2, k) array
+        Row and column of each press, and of its largest reading, from 0.
+    """
+    for letter, own, read_at in zip("rc", pressed, largest, strict=True):
         for track in np.unique(own[own != read_at]).tolist():
             at = read_at[own == track]
             other = int(np.bincount(at).argmax())
             if other != track and np.mean(at == other) > _MOST:
-                raise BadInput(
-                    f"{of.name}: presses on {letter}{track + 1} are read at {letter}{other + 1}: wires swapped; "
+                return (
+                    f"presses on {letter}{track + 1} are read at {letter}{other + 1}: wires swapped; "
                     "exchange them, or name the press right"
                 )
+    return ""
 
 
 def _session(

@@ -7,13 +7,14 @@ effect on abs(Z) under one reference load; each level may use what the levels be
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, isinf
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.capacitance import Answer, default_width, weighed
 from sensorgen.prediction.compression_law import Law, LawOption, infill, nearest, options
+from sensorgen.prediction.mesh_ladder import QUICK
 from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_until_within
 from sensorgen.prediction.query import DEFAULT, FLAT, Load, Query, Tip
 from sensorgen.prediction.reference_load import ReferenceLoad
@@ -191,7 +192,10 @@ def _results(cell: Level, answer: Answer) -> Level:
 
 def _compression(laws: list[LawOption], sensor: Sensor, load: Load, allowed: float) -> Level:
     candidates = tuple(PlanCandidate(o.name, _error_of_law(sensor, load, o.expected), o.seconds) for o in laws)
-    return Level("compression", _ERROR_OF_Z, allowed, candidates, cheapest(candidates, allowed))
+    first = cheapest(candidates, allowed)
+    if all(isinf(c.reach()) for c in candidates):  # beyond the prototype's pressures, where the usual mesh serves most
+        first = next((c.model for c in candidates if c.model in QUICK[:2]), first)
+    return Level("compression", _ERROR_OF_Z, allowed, candidates, first)
 
 
 def _with_failures(law: Law, level: Level) -> Law:

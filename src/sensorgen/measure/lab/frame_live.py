@@ -17,9 +17,10 @@ from typing import IO, TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.core.arrays import Complex, Mask, Real, Whole
 from sensorgen.core.errors import BadInput, MissingValue
 from sensorgen.core.files import reading
+from sensorgen.measure.array_frames import swapped
 from sensorgen.measure.lab.devices import Clock, DeviceFault, FrameMeter
 from sensorgen.measure.lab.live import LiveView
 
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from sensorgen.prediction.array.live import LiveMaps
     from sensorgen.prediction.array.model import ArrayModel
 
+PRESS_FRAMES = 20  # under load, by which a known press is compared
+_SIGMAS = 5.0  # pressure over its standard error from which on a frame is loaded [-]
 _HDF = (".h5", ".hdf5", ".hdf")
 _CHUNK = 64  # frames
 _COMPLEX = np.complex64  # seven digits, as of the stream
@@ -241,6 +244,36 @@ class FrameFeed:
         self._over.set()
 
 
+@dataclass(eq=False)
+class KnownPress:
+    """The first press on an array, on a crossing that the operator names: another that reads it shows swapped wires.
+
+    Attributes
+    ----------
+    at : (int, int)
+        Row and column, from 0.
+    """
+
+    at: tuple[int, int]
+    _read: "list[Whole]" = field(default_factory=list)
+
+    def take(self, maps: "PressureMaps") -> None:
+        """The places of the largest pressures of the first loaded frames."""
+        for kpa, sigma in zip(maps.pressure_kpa, maps.sigma_kpa, strict=True):
+            peak = np.nan_to_num(kpa, nan=-np.inf)
+            place = np.unravel_index(peak.argmax(), peak.shape)
+            if len(self._read) < PRESS_FRAMES and peak[place] > _SIGMAS * sigma[place]:
+                self._read.append(np.array(place))
+
+    def words(self) -> str:
+        """Wires that are swapped, or that none are; "" before it has been pressed for long enough."""
+        if len(self._read) < PRESS_FRAMES:
+            return ""
+        places = np.transpose(self._read)
+        pressed = np.repeat(np.array(self.at)[:, None], len(self._read), axis=1)
+        return swapped(pressed, places) or f"the press on r{self.at[0] + 1}c{self.at[1] + 1} is read there"
+
+
 class MapView(LiveView):
     """Live page of an array: map, trace of the centre of pressure, force, regions."""
 
@@ -276,7 +309,10 @@ class MapView(LiveView):
         return row, json.dumps(self._last_map | words)
 
 
-def follow(feed: FrameFeed, live: "LiveMaps", view: "MapView | None", clock: Clock, until_s: float) -> None:
+def follow(
+    feed: FrameFeed, live: "LiveMaps", view: "MapView | None", clock: Clock, until_s: float,
+    press: "KnownPress | None" = None,
+) -> None:  # fmt: skip
     """Invert and show what a feed brings, until a time, a command or a fault.
 
     Raises
@@ -288,15 +324,18 @@ def follow(feed: FrameFeed, live: "LiveMaps", view: "MapView | None", clock: Clo
         feed.obey(view.commands() if view else ())
         frames = feed.taken()
         maps = live.take(*frames) if len(frames[1]) and not feed.paused else None
+        if press and maps:
+            press.take(maps)
         if view:
-            view.show(clock.now(), maps, _words(feed, live))
+            view.show(clock.now(), maps, _words(feed, live, press))
         if feed.fault:
             raise feed.fault
         if not len(frames[1]):
             clock.wait_until(clock.now() + _IDLE_S)
 
 
-def _words(feed: FrameFeed, live: "LiveMaps") -> dict[str, Any]:
+def _words(feed: FrameFeed, live: "LiveMaps", press: "KnownPress | None") -> dict[str, Any]:
     by = live.plan.words() if live.tared else "not tared: unload the array, and press Unloaded"
+    by = "; ".join(filter(None, (press.words() if press else "", by)))
     recording = None if feed.recorder is None else feed.recording
     return {"by": by, "paused": feed.paused, "recording": recording, **feed.counts, "skipped": live.dropped}

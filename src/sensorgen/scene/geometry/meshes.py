@@ -287,7 +287,8 @@ def _fault(body: Body, mesh: Mesh) -> str:
 
     exact, got, off = body.volume_mm3(), mesh.volume_mm3(), _off_mm(body)
     is_sound = _two_manifold(mesh)
-    are_apart = is_sound and len(mesh.triangles) > _MANY and _shells_are_apart(mesh)
+    near = _near(mesh) if is_sound else mesh
+    are_apart = is_sound and len(mesh.triangles) > _MANY and not len(near.triangles)
     status = manifold3d.Error.NoError if are_apart else mesh.solid().status()
     if status != manifold3d.Error.NoError:
         return f"not a closed oriented surface ({status.name})"
@@ -296,7 +297,7 @@ def _fault(body: Body, mesh: Mesh) -> str:
     area = mesh.area_mm2()
     if abs(got - exact) > 1e-9 * exact + off * area:  # rounding, and chords in place of arcs
         return f"encloses {got:.9g} mm3, not {exact:.9g} mm3"
-    if not are_apart and (twice := _self_overlap_mm3(mesh.solid())) > (OVERLAP_MM + off) * area:
+    if len(near.triangles) and (twice := _self_overlap_mm3(near.solid())) > (OVERLAP_MM + off) * area:
         return f"overlaps itself by {twice:.3g} mm3"
     box = [*mesh.vertices_mm.min(0), *mesh.vertices_mm.max(0)]
     return "" if np.allclose(box, _box_mm(body), rtol=0.0, atol=OVERLAP_MM + off) else "is not where it is drawn"
@@ -347,8 +348,8 @@ def _self_overlap_mm3(solid: "manifold3d.Manifold") -> float:
     return float(solid.volume() - united.volume())
 
 
-def _shells_are_apart(mesh: Mesh) -> bool:
-    """True where the boxes around its shells share faces at most: a thousandth of the time to take it apart."""
+def _near(mesh: Mesh) -> Mesh:
+    """Shells whose boxes share more than a face with another's: of others no two overlap."""
     from sensorgen.scene.connections import groups
 
     label = groups(len(mesh.vertices_mm), *mesh.triangles[:, [0, 1, 1, 2]].reshape(-1, 2).T)
@@ -359,7 +360,10 @@ def _shells_are_apart(mesh: Mesh) -> bool:
     plans = shapely.box(*low[:, :2].T, *high[:, :2].T)
     one, other = shapely.STRtree(plans).query(plans)
     shared = np.minimum(high[one], high[other]) - np.maximum(low[one], low[other])
-    return not ((shared > OVERLAP_MM).all(1) & (one < other)).any()
+    near = np.isin(label, label[order][starts][one[(shared > OVERLAP_MM).all(1) & (one != other)]])
+    return Mesh(
+        mesh.vertices_mm[near], (np.cumsum(near) - 1)[mesh.triangles[near[mesh.triangles[:, 0]]]].astype(np.int32)
+    )
 
 
 def _overlaps(solids: Mapping[str, "manifold3d.Manifold"], off_mm: Mapping[str, float]) -> list[tuple[str, str]]:

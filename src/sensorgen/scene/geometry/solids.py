@@ -212,10 +212,11 @@ def _in_order(colours: bytes) -> bytes:
     """The entities of the colours, numbered as one meets them on the way from each body's list, body by body."""
     entities = {int(match[1]): b"".join(match[2].split(b"\n")) for match in _ENTITY.finditer(colours)}
     places: dict[int, int] = {}
+    first = min(entities, default=0)
 
     def visit(number: int) -> None:
         if number in entities and number not in places:
-            places[number] = min(entities) + len(places)
+            places[number] = first + len(places)
             for other in _references(entities[number]):
                 visit(other)
 

@@ -1,0 +1,45 @@
+"""Deposit of lines on a raster, laid in lots, by its volume and first moments, which no raster changes."""
+
+import numpy as np
+import pytest
+
+from sensorgen.asprinted import ledger
+from sensorgen.asprinted.beads import Beads
+
+SHAPE = (150, 120)
+
+
+def lines(start_mm, end_mm, width_mm, height_mm=0.1):
+    way, whole = np.hypot(*(end_mm - start_mm).T), np.zeros(len(start_mm), int)
+    height = np.full(len(way), height_mm)
+    return Beads(start_mm, end_mm, width_mm, height, way * width_mm * height, whole, whole, whole, whole)
+
+
+@pytest.mark.parametrize("lot", [7, 1000, 10**6])
+def test_each_lot_keeps_volume_and_middle_of_its_lines(lot, monkeypatch):
+    monkeypatch.setattr(ledger, "_LOT", lot)
+    rng = np.random.default_rng(7)
+    start, end = (rng.uniform(1.0, [11.0, 8.0], (40, 2)) for _ in range(2))
+    beads = lines(start, end, rng.uniform(0.3, 0.6, 40))
+    filled = ledger.deposit(beads, SHAPE)
+    plan = beads.volume_mm3 / beads.height_mm
+    assert filled.sum() * ledger.PITCH_MM**2 == pytest.approx(plan.sum(), rel=1e-5)
+    for axis in (0, 1):
+        places = (np.arange(SHAPE[axis]) + 0.5 - ledger._MARGIN) * ledger.PITCH_MM
+        moment = (filled.sum(1 - axis) * places).sum() * ledger.PITCH_MM**2
+        assert moment == pytest.approx((plan * (start + end)[:, axis] / 2).sum(), rel=1e-4)
+
+
+def test_a_line_fills_its_rectangle_and_what_lies_outside_the_raster_is_left_out():
+    """0.5 mm wide along y = 4.25 mm, from the middle of the raster's last rows out of it."""
+    end_mm = (SHAPE[0] - ledger._MARGIN) * ledger.PITCH_MM
+    filled = ledger.deposit(lines(np.array([[2.0, 4.25]]), np.array([[end_mm + 5.0, 4.25]]), np.array([0.5])), SHAPE)
+    inside = filled[ledger._MARGIN + 21 : -2, ledger._MARGIN + 40 : ledger._MARGIN + 45]
+    assert inside == pytest.approx(1.0, rel=1e-3)
+    assert filled[ledger._MARGIN + 21 : -2].sum() == pytest.approx(inside.sum(), rel=1e-3)
+    assert filled[: ledger._MARGIN + 19].sum() == 0
+
+
+def test_nothing_fills_nothing():
+    none = np.zeros((0, 2))
+    assert not ledger.deposit(lines(none, none, np.zeros(0)), SHAPE).any()
