@@ -302,13 +302,22 @@ def _incompressible(design: Design) -> bool:
 
 
 def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> str:
-    """Identity of a cell's cross-section or its mirror image, to a digit of a millimetre; "" where it has several."""
+    """Identity of a cell's cross-section or its mirror image, else of its boxes, to a digit of a millimetre.
+
+    "" of other cells.
+    """
     try:
         section, *others = sections(piece.scene)
     except ValueError:
         return ""
     if others:
-        return ""
+        parts = [(body, p) for body in piece.scene.bodies for p in body.pieces]
+        if turned or not all(p.is_box() for _, p in parts):
+            return ""
+        spans = sorted(
+            (b.material, b.terminal, [[round(v, digits) for v in p.span(n)] for n in "xyz"]) for b, p in parts
+        )
+        return _hashed([spans, piece.period_mm])
     outlines = [outline for _, outline in section.regions]
     if turned:
         outlines = _mirrored(outlines)
@@ -316,7 +325,11 @@ def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> st
         (body.material, body.terminal, [[round(v, digits) for v in corner] for corner in outline])
         for (body, _), outline in zip(section.regions, outlines, strict=True)
     )
-    return sha256(dumps([regions, piece.period_mm]).encode()).hexdigest()[:16]
+    return _hashed([regions, piece.period_mm])
+
+
+def _hashed(values: list[object]) -> str:
+    return sha256(dumps(values).encode()).hexdigest()[:16]
 
 
 def _mirrored(outlines: Sequence[tuple[Point, ...]]) -> list[tuple[Point, ...]]:
