@@ -3,7 +3,8 @@
 A second program beside press3d: displacement of order 3 and pressure of order 2 at small strain, air carried along by
 Laplace's equation, and a potential of order 4 on the deformed mesh. It shares no line with sensorgen. Writes
 ``tests/reference/rect_rise.json``; five minutes. ``python bench/rect_rise.py large`` adds one cell under pressures
-of Table 1.1, neo-Hookean at finite strain, in steps; its gaps stay open.
+of Table 1.1, neo-Hookean at finite strain, in steps; its gaps stay open. Bricks that shrink towards planes rise by 13 %
+more there than even ones, whose corners are too stiff.
 """
 
 import json
@@ -26,7 +27,7 @@ CELLS = (  # mm
     {"dielectric_mm": 0.2, "lower_height_mm": 0.3, "upper_height_mm": 0.3, "x60_width_mm": 0.7},
     {"dielectric_mm": 0.1, "lower_height_mm": 0.4, "upper_height_mm": 0.2, "x60_width_mm": 0.9},
 )
-LARGE_KPA, STEP_KPA, LARGE_MESHES = (345, 700, 1103), 200, ((0, 0.3, 2), (0, 0.3, 3))
+LARGE_KPA, STEP_KPA, LARGE_MESHES = (345, 700, 1103), 200, ((0, 0.3, 2), (0, 0.3, 3), (1, 0.3, 2))
 MESHES = ((1, 0.3, 3), (2, 0.3, 3))  # layers at planes, how they shrink, order
 
 
@@ -188,7 +189,7 @@ def solved(cell, layers, ratio, order):
 
 def main():
     if sys.argv[1:] == ["large"]:
-        solutions = [{"order": m[2], "loads": at_large(CELLS[1], *m)} for m in LARGE_MESHES]
+        solutions = [{"layers": m[0], "order": m[2], "loads": at_large(CELLS[1], *m)} for m in LARGE_MESHES]
         whole = json.loads(FILE.read_text()) | {"large": CELLS[1] | {"meshes": solutions}}
         FILE.write_text(json.dumps(whole, indent=1) + "\n")
         return

@@ -8,15 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
+from sensorgen.design.tip import EVEN
 from sensorgen.prediction import compression_law as celllaw
 from sensorgen.prediction import planning, rest_state
-from sensorgen.prediction.bodies import drawn
-from sensorgen.prediction.capacitance import PLANE
+from sensorgen.prediction.bodies import drawn, estimated
+from sensorgen.prediction.capacitance import PLANE, Answer
 from sensorgen.prediction.query import Load as Press
 from sensorgen.prediction.query import Tip
+from sensorgen.prediction.sensor_model import piece
 
+GAPS = Answer("columns", Interval(1e-10, 2e-10), ())
 TONES = (1.1e3, 99.7e3)
 PRESS = Press(TONES, 6.0, 0.05)
 needs_mesher = pytest.mark.skipif("not __import__('importlib').util.find_spec('netgen')", reason="needs NGSolve")
@@ -64,6 +68,22 @@ def test_a_cell_in_3d_has_an_interval_far_beyond_its_prototype():
     assert law.bounded
     assert least < 0.01 < exact["rise"] < most < 4
     assert any("none and that of the closed cell" in doubt for doubt in law.doubts)
+
+
+def test_the_printed_prototype_in_3d_is_stored_up_to_table_1_1():
+    """Its range holds what another program finds on two meshes, of the cell as drawn; other films have none stored."""
+    large = json.loads((Path(__file__).parent / "reference" / "rect_rise.json").read_text("utf-8"))["large"]
+    ends = {}
+    for film_mm in (0.2, 0.1):
+        cell = make({"shape": "rect", "parameters": {"dielectric_mm": film_mm}})
+        law = celllaw.law_of(cell, GAPS, printed=piece(estimated(cell, "arachne")), tip=Tip(block=EVEN), until_pa=1.1e6)
+        ends[film_mm] = law.others
+    assert ends[0.1] == ()
+    for mesh in large["meshes"][1:]:
+        for load in mesh["loads"]:
+            stress_pa = np.asarray(1e3 * load["pressure_kpa"])
+            least, most = (float(1 / (1 - c.capacitive_strain(stress_pa)[0]) - 1) for c in ends[0.2])
+            assert least < load["rise"] < most < 1.4 * least
 
 
 def test_the_cheapest_of_each_level_is_taken_and_the_whole_holds_the_truth():

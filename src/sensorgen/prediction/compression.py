@@ -24,7 +24,15 @@ from sensorgen.models.compression import curve_of
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.prediction import capacitance_answer as at_rest
 from sensorgen.prediction.capacitance import Answer, Unpredictable, capacitance, is_plate
-from sensorgen.prediction.compression_law import case_of, elastic, gap_m, infill, law_of, under_tops
+from sensorgen.prediction.compression_law import (
+    case_of,
+    closed_f_per_m2,
+    elastic,
+    gap_m,
+    infill,
+    law_of,
+    under_tops,
+)
 from sensorgen.prediction.mesh_ladder import (
     MODELS,
     USUAL,
@@ -215,7 +223,7 @@ class CompressionResult(Displayed):
     held : dict of str to str
         Boundary conditions.
     stress_kpa, displacement_um : tuple of float
-        On the top [kPa], of the top [um].
+        On the top [kPa], of the top [um]; None beyond the highest stress that was solved.
     rise_f_per_m2 : tuple of float or None
         Capacitance per area above that at rest, at each stress [F/m2].
     displacement_error_um, rise_error_f_per_m2 : tuple of float or None
@@ -223,7 +231,7 @@ class CompressionResult(Displayed):
     lower_f_per_m2, upper_f_per_m2 : tuple of float or None
         Bounds of the capacitance per area at each stress [F/m2]; None where unknown.
     converged_kpa : float or None
-        Highest stress that was solved [kPa].
+        Highest stress that was solved [kPa]; beyond it the capacitance lies between that one's and the closed cell's.
     faults, doubts : tuple of str
         Why the answer is not to be trusted; why its numbers are uncertain.
     bounds : str
@@ -247,7 +255,7 @@ class CompressionResult(Displayed):
     model: str | None = None
     held: dict[str, str] = field(default_factory=dict)
     stress_kpa: tuple[float, ...] = ()
-    displacement_um: tuple[float, ...] = ()
+    displacement_um: tuple[float | None, ...] = ()
     displacement_error_um: tuple[float | None, ...] = ()
     rise_f_per_m2: tuple[float | None, ...] = ()
     rise_error_f_per_m2: tuple[float | None, ...] = ()
@@ -288,7 +296,9 @@ class CompressionResult(Displayed):
         errors = (("displacement", self.largest_displacement_error), ("rise of C", self.largest_rise_error))
         known = "".join(f"; {name} known to {error:.1%}" for name, error in errors if error is not None)
         target = "" if self.accuracy is None else f" (target {self.accuracy:.3g})"
-        yield f"converged up to {self.converged_kpa:.4g} kPa{known}{target}"
+        last_kpa = max(self.stress_kpa, default=0.0)
+        bounds = f", bounds up to {last_kpa:.4g} kPa" if self.displacement_um[-1:] == (None,) else ""
+        yield f"converged up to {self.converged_kpa:.4g} kPa{bounds}{known}{target}"
         yield from self.remarks()
 
     def explained(self) -> Iterator[Part]:
@@ -460,7 +470,7 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: PressQuestion) ->
     lower, upper = (rise - off + rest.lower, rise + off + rest.upper) if rest else (nan + rise, nan + rise)
     errors = (inf, inf) if solution.faults else estimate.relative()
     displacement_error, rise_error = (error if error < inf else None for error in errors)
-    return CompressionResult(
+    result = CompressionResult(
         design=body.design.name, body=body.provenance, model=case.model,
         held=vars(case.boundary) | ({"top": tip.material} if BLOCK in case.solids else {}),
         stress_kpa=tuple(p / _PA_PER_KPA for p in solution.stress_pa.tolist()),
@@ -472,6 +482,49 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: PressQuestion) ->
         doubts=(*solution.doubts, *_assumed(body.design)),
         largest_rise_error=rise_error, largest_displacement_error=displacement_error,
         tops=dict(_under_tops(body, case, estimate, tip)),
+    )  # fmt: skip
+    return _further(result, replace(case, piece=piece_of(body)), estimate, asked, rest, factor)
+
+
+def _further(
+    result: CompressionResult, case: Case, estimate: Estimate, asked: PressQuestion, rest: Interval | None,
+    factor: float,
+) -> CompressionResult:  # fmt: skip
+    """A result up to all stresses asked for: beyond the last that was solved by bounds, as laws of compression are.
+
+    As it is where its solution has other faults than that it ended, and where the closed cell is unknown.
+    """
+    more = [kpa for kpa in asked.stress_kpa if kpa * _PA_PER_KPA > estimate.found.converged_pa * (1 + 1e-9)]
+    last_f, least_f = result.upper_f_per_m2[-1], result.lower_f_per_m2[-1]
+    sound = estimate.found.sound()
+    is_sound = not sound.faults and sound.converged_pa == estimate.found.converged_pa
+    if not (more and is_sound and rest and last_f and least_f):
+        return result
+    try:
+        most_f = np.array([max(last_f, factor * closed_f_per_m2(case, _PA_PER_KPA * kpa)) for kpa in more])
+        own = curve_of(sound)
+    except (ValueError, OutOfRange):
+        return result
+    last_kpa, slope = estimate.found.converged_pa / _PA_PER_KPA, own.slope_per_pa[-1] * rest.middle() * _PA_PER_KPA
+    rise = (result.rise_f_per_m2[-1] or 0.0) + slope * (np.array(more) - last_kpa)
+    rise = np.minimum(rise, most_f - rest.upper)
+    off = np.maximum(rise + rest.lower - least_f, most_f - rise - rest.upper)
+    none = (None,) * len(more)
+    doubt = (
+        f"from {last_kpa:.4g} to {more[-1]:.4g} kPa the cell was not solved: C lies between that at {last_kpa:.4g} kPa "
+        "and that of the closed cell"
+    )
+    return replace(
+        result,
+        stress_kpa=(*result.stress_kpa, *more),
+        displacement_um=(*result.displacement_um, *none),
+        displacement_error_um=(*result.displacement_error_um, *none),
+        rise_f_per_m2=(*result.rise_f_per_m2, *rise.tolist()),
+        rise_error_f_per_m2=(*result.rise_error_f_per_m2, *off.tolist()),
+        lower_f_per_m2=(*result.lower_f_per_m2, *(least_f for _ in more)),
+        upper_f_per_m2=(*result.upper_f_per_m2, *most_f.tolist()),
+        tops={name: (*values, *none) for name, values in result.tops.items()},
+        faults=(), doubts=(doubt, *result.doubts), largest_rise_error=float((off / rise).max()),
     )  # fmt: skip
 
 
@@ -493,7 +546,7 @@ def _under_tops(
 ) -> Iterator[tuple[str, tuple[float | None, ...]]]:  # fmt: skip
     """Rise of C under an even pressure and a stiff plate, where it differs by more than the error."""
     try:
-        own = curve_of(estimate.found)
+        own = curve_of(estimate.found.sound())
         laws = under_tops(body.design, piece_of(body), case.model, tip, own, case.boundary)
     except SensorgenError:
         return

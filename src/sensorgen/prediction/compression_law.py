@@ -234,10 +234,9 @@ def nearest(design: Design, piece: PressedPiece, answer: Answer, until_pa: float
         return replace(law, bounded=False)
     case = _case(design, piece, "press3d", BoundaryConditions())
     area_m2 = design.params.length_mm * design.params.width_mm * M_PER_MM**2
-    softest_pa = min(case.solids[b.material].youngs_modulus_pa for b in piece.scene.bodies if not b.terminal)
     loads = (*like.stress_pa[1:], until_pa)
     try:
-        closed_f = [closed.most_f_per_m2(piece.scene, case.permittivity, softest_pa, p) * area_m2 for p in loads]
+        closed_f = [closed_f_per_m2(case, p) * area_m2 for p in loads]
     except ValueError:
         return replace(law, bounded=False)
     most = compression.curve(
@@ -303,13 +302,22 @@ def _incompressible(design: Design) -> bool:
 
 
 def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> str:
-    """Identity of a cell's cross-section or its mirror image, to a digit of a millimetre; "" where it has several."""
+    """Identity of a cell's cross-section or its mirror image, else of its boxes, to a digit of a millimetre.
+
+    "" of other cells.
+    """
     try:
         section, *others = sections(piece.scene)
     except ValueError:
         return ""
     if others:
-        return ""
+        parts = [(body, p) for body in piece.scene.bodies for p in body.pieces]
+        if turned or not all(p.is_box() for _, p in parts):
+            return ""
+        spans = sorted(
+            (b.material, b.terminal, [[round(v, digits) for v in p.span(n)] for n in "xyz"]) for b, p in parts
+        )
+        return _hashed([spans, piece.period_mm])
     outlines = [outline for _, outline in section.regions]
     if turned:
         outlines = _mirrored(outlines)
@@ -317,7 +325,11 @@ def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> st
         (body.material, body.terminal, [[round(v, digits) for v in corner] for corner in outline])
         for (body, _), outline in zip(section.regions, outlines, strict=True)
     )
-    return sha256(dumps([regions, piece.period_mm]).encode()).hexdigest()[:16]
+    return _hashed([regions, piece.period_mm])
+
+
+def _hashed(values: list[object]) -> str:
+    return sha256(dumps(values).encode()).hexdigest()[:16]
 
 
 def _mirrored(outlines: Sequence[tuple[Point, ...]]) -> list[tuple[Point, ...]]:
@@ -477,19 +489,25 @@ def solved(
     return _further(law, replace(curve, doubts=doubts), tops, replace(case, piece=piece), until_pa, at_rest)
 
 
+def closed_f_per_m2(case: Case, stress_pa: float) -> float:
+    """Capacitance per area that a case does not exceed under a pressure [F/m2]; ValueError where it has no columns."""
+    from sensorgen.models import closed
+
+    scene = case.piece.scene
+    softest_pa = min(case.solids[b.material].youngs_modulus_pa for b in scene.bodies if not b.terminal)
+    return closed.most_f_per_m2(scene, case.permittivity, softest_pa, stress_pa)
+
+
 def _further(
     law: Law, own: CapacitanceCurve, tops: Mapping[str, CapacitanceCurve], case: Case, until_pa: float,
     at_rest: Interval | None,
 ) -> Law:  # fmt: skip
     """A law up to a pressure that its cell was not solved for: between no further rise and that of the closed cell."""
-    from sensorgen.models import closed
-
-    scene, last_pa, (least, upper) = case.piece.scene, own.stress_pa[-1], _ends(own)
+    last_pa, (least, upper) = own.stress_pa[-1], _ends(own)
     if not at_rest or until_pa <= last_pa:
         return law
-    softest_pa = min(case.solids[b.material].youngs_modulus_pa for b in scene.bodies if not b.terminal)
     try:
-        most = closed.most_f_per_m2(scene, case.permittivity, softest_pa, until_pa) / at_rest.lower
+        most = closed_f_per_m2(case, until_pa) / at_rest.lower
     except ValueError:
         return law
     most = max(most, upper.ratio[-1])

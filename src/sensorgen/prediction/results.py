@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 _SHORT = 60  # characters that say what an assumption is, on a first screen
 _LEAST_PERCENT = 0.005  # change of a value that is not rounding
+_LEFT = 0.01  # share of R at its worst that all terms but one have, below which that one is named [-]
 _LEAST_SHARE = 1e-3  # change of C and R: less is not said
 _LEAST_N, _LEAST_M = 1e-3, 1e-5  # by which a press is read wrongly: less is not said
 UNPREDICTED = "12-numbers"  # rule of the finding that there are none
@@ -194,6 +195,7 @@ class ErrorBudget:
         yield Table("budget", caption, columns, tuple((t.name, *_percent(t, 4), t.remark()) for t in terms))
         largest = self.largest()
         yield f"largest: {largest.name} ({largest.what})"
+        yield from self._by_one()
         if not self.accuracy:
             return
         beyond = f"; larger alone: {', '.join(self.beyond())}" if self.beyond() else ""
@@ -203,6 +205,14 @@ class ErrorBudget:
             yield f"accuracy {self.accuracy:g} of |Z| reached by the models, not by print, material and leads{beyond}"
         else:
             yield f"accuracy {self.accuracy:g} of |Z| not reached by the models{beyond}"
+
+    def _by_one(self) -> Iterator[str]:
+        """What is left of R at its worst without one term that is nearly all of it, as one over D squared is."""
+        known = [t for t in self.terms if t.changes]
+        most = max(known, key=lambda t: (t.changes or Changes()).re, default=None)
+        left = sum((t.changes or Changes()).re for t in known if t is not most)
+        if most and self.total and left < _LEFT * self.total.re:
+            yield f"R at its worst is that of one term, {most.name}: {100 * left:.2g} % without it"
 
     def assumed(self) -> Iterator[Part]:
         """Effects of each assumption alone at the ends of its range, the largest on a press first."""

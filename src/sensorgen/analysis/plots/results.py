@@ -131,9 +131,10 @@ def _is_number(cell: Cell) -> bool:
 
 def compression_figure(result: CompressionResult) -> Figure:
     """Displacement and capacitance of a result over stress."""
-    stress, displacement = result.stress_kpa, result.displacement_um
+    stress, displacement = result.stress_kpa, [d for d in result.displacement_um if d is not None]
     x = Axis("stress [kPa]", low=0.0)
-    curve = (Curve("line", "", stress, displacement), Curve("points", "", stress, displacement))
+    solved = stress[: len(displacement)]
+    curve = (Curve("line", "", solved, displacement), Curve("points", "", solved, displacement))
     panels = [Panel(curve, x, Axis("displacement of the top [µm]", low=0.0))]
     bounds = {"lower bound": (result.lower_f_per_m2, BLUE, "triangle-up"),
               "upper bound": (result.upper_f_per_m2, ORANGE, "triangle-down")}  # fmt: skip

@@ -42,14 +42,14 @@ def _pressed(
             tip=Tip(block=EVEN),
         ),
     )
-    if curve.faults:
-        raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {curve.faults[0]}")
+    if curve.faults or None in curve.displacement_um:
+        raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {'; '.join(curve.faults or curve.doubts)}")
     return curve
 
 
 def _top(name: str, moved: compressed.CompressionResult, thesis_mm: float) -> ItemPart:
     """Displacement of the top of a cell, against that of the thesis."""
-    ours = float(moved.displacement_um[-1]) * _M_PER_UM
+    ours = float(np.array(moved.displacement_um, float)[-1]) * _M_PER_UM
     return ItemPart(name, "m", ours, thesis_mm * M_PER_MM, shown=_SHOWN)
 
 
@@ -85,7 +85,7 @@ def gain(rise_f: float, deepest_mm: float, rect_f: float, film_mm: float) -> lis
     """6.12: by how much the capacitance of both cells rises, and how far the slope has to be extended."""
     tri, rect = (_pressed(shape, parameters={"dielectric_mm": film_mm}) for shape in ("tri", "rect"))
     rise = _rise_f(tri, _CELL_M2)
-    deep = float(tri.displacement_um[-1]) * _M_PER_UM * rise_f / rise
+    deep = float(np.array(tri.displacement_um, float)[-1]) * _M_PER_UM * rise_f / rise
     return [
         ItemPart("(a) rise at 100 kPa, 2 mm by 20 mm", "F", rise, rise_f, shown=_SHOWN),
         ItemPart(
