@@ -139,7 +139,7 @@ def test_specimens_held_back_have_no_say(tmp_path):
     kept_back = held_back(sorted(names), 23)
     made = []
     for factor in (1.0, 2.0):
-        with Log(tmp_path / f"{factor}.db", create=True) as log:
+        with Log(tmp_path / f"{factor}.db", create=True) as log, roughly_at_rest():
             for k, name in enumerate(names):
                 ohm = (600 + 30 * k) * (factor if name in kept_back else 1.0)
                 log.add([notes.reading(name, f"{ohm:g}", "OL")])

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import threading
+from functools import cache
 
 import numpy as np
 import pytest
@@ -35,10 +36,14 @@ def registered(monkeypatch):
         monkeypatch.setattr(cli, "COMMANDS", (*cli.COMMANDS, "invert"))
 
 
+@cache
+def sensor():
+    """The model behind the command, computed once: most tests look at words."""
+    return sensor_model(default_body(make(PLAIN)))[0].sensor
+
+
 def table(force=FORCE, position=POSITION, extra=()):
-    z = sensor_model(default_body(make(PLAIN)))[0].sensor.impedance(
-        np.array(list(TONES.values())), force[:, None], position[:, None] * 1e-3
-    )
+    z = sensor().impedance(np.array(list(TONES.values())), force[:, None], position[:, None] * 1e-3)
     names = [f"{part}_ohm_{tone}" for tone in TONES for part in ("re", "im")]
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -74,9 +79,8 @@ def test_there_and_back(run, tmp_path):
 def test_the_covariance_is_the_bound_in_newtons_and_millimetres(run, tmp_path):
     (tmp_path / "m.csv").write_text(table())
     run("invert", *DESIGN, "m.csv", "-o", "o.csv")
-    sensor = sensor_model(default_body(make(PLAIN)))[0].sensor
     for row, force, position in zip(answers((tmp_path / "o.csv").read_text()), FORCE, POSITION, strict=True):
-        z, by_force, by_position = sensor.response(np.array(list(TONES.values())), force, position * 1e-3)
+        z, by_force, by_position = sensor().response(np.array(list(TONES.values())), force, position * 1e-3)
         j = np.stack([by_force / abs(z), by_position * 1e-3 / abs(z)], -1) / 1e-3
         bound = np.linalg.inv((j.conj().T @ j).real)
         assert float(row["covariance_n_mm"]) == pytest.approx(bound[0, 1], rel=0.02)
@@ -136,7 +140,7 @@ def test_what_to_do_is_said(run, tmp_path):
 
 
 def test_one_tone_says_so(run, tmp_path):
-    z = sensor_model(default_body(make(PLAIN)))[0].sensor.impedance(99.7e3, 3.0, 0.05)
+    z = sensor().impedance(99.7e3, 3.0, 0.05)
     (tmp_path / "m.csv").write_text(f"re_ohm_99.7kHz,im_ohm_99.7kHz\n{z.real},{z.imag}\n")
     assert "note: one frequency gives two numbers for two unknowns" in run("invert", *DESIGN, "m.csv").out
 
