@@ -13,8 +13,9 @@ from pathlib import Path
 
 from sensorgen.core.errors import BadInput
 from sensorgen.measure import immittance
-from sensorgen.measure.csv_table import checked_head, miscounted
+from sensorgen.measure.csv_table import miscounted
 from sensorgen.measure.immittance import AcReading
+from sensorgen.measure.input_file import checked_head
 
 MOST_BYTES = 16_000_000
 EXPECTED = "a header such as Frequency,Cp,D with numbers below it"

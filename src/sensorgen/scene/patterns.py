@@ -9,6 +9,7 @@ Structures in a square array that hang from the top electrode, their tips on a f
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from math import ceil, cos, floor, pi, sin
 
 from sensorgen.core.errors import OutOfRange
@@ -272,8 +273,7 @@ def array_scene(
     starts = [(size - n * p.period_mm) / 2 for size, n in zip((p.length_mm, p.width_mm), counts, strict=True)]
     places = [
         (rounded(starts[0] + (i + 0.5) * p.period_mm), rounded(starts[1] + (j + 0.5) * p.period_mm))
-        for i in range(counts[0])
-        for j in range(counts[1])
+        for i, j in product(range(counts[0]), range(counts[1]))
     ]
 
     cogs = tuple(piece for x, y in places for piece in structure(x, y, rounded(film)))

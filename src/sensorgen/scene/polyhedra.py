@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 from math import hypot, inf, isfinite
 
 from sensorgen.core.errors import BadInput
@@ -57,9 +58,9 @@ class Polyhedron:
             object.__setattr__(self, "triangles", tuple((a, c, b) for a, b, c in self.triangles))
 
     def _fault(self) -> str:
-        if not all(isfinite(value) for vertex in self.vertices for value in vertex):
+        if not all(map(isfinite, chain.from_iterable(self.vertices))):
             return "has a corner that is nowhere"
-        if not all(0 <= number < len(self.vertices) for triangle in self.triangles for number in triangle):
+        if not all(0 <= number < len(self.vertices) for number in chain.from_iterable(self.triangles)):
             return "refers to a vertex that it does not have"
         start = self._open_edge()
         if start is not None:

@@ -208,6 +208,12 @@ def _map(axes: "Axes", part: Map, label: str) -> None:
     extend = _EXTEND[smallest < low - least, largest > high + least]
     shown = "{x:g}" if part.log else ScalarFormatter(useOffset=False)
     bar = axes.figure.colorbar(mesh, ax=axes, extend=extend, format=shown, label=label)
+    _contours(axes, part, bar)
+
+
+def _contours(axes: "Axes", part: Map, bar: Any) -> None:
+    """Levels within the map, the first of them solid; also in the bar of a logarithmic one."""
+    smallest, largest = part.extent
     colour, width, alpha, others = ("white", 1.4, 1.0, "dashed") if part.log else ("black", 0.4, 0.6, "solid")
     for k, level in enumerate(part.levels):
         if smallest < level < largest:

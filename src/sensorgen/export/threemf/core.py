@@ -62,6 +62,15 @@ class Part:
     settings: Mapping[str, str] = field(default_factory=dict)
 
 
+def _texts(title: str, parts: Sequence[Part]) -> Iterator[tuple[str, str]]:
+    """All texts of a file, each with what it is."""
+    yield "title", title
+    for part in parts:
+        yield "name", part.name
+        yield "material", part.material
+        yield from ((f"setting of body {part.name!r}", s) for s in (*part.settings.keys(), *part.settings.values()))
+
+
 def _check_part(part: Part) -> None:
     if not re.fullmatch("#[0-9a-fA-F]{6}", part.colour):
         raise BadInput(f"colour {part.colour!r} of body {part.name!r} is not of the form #rrggbb")
@@ -98,12 +107,9 @@ def check(title: str, parts: Sequence[Part], centre_mm: tuple[float, float]) -> 
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise BadInput(f"two bodies are called {twice[0]!r}: name each body once")
-    texts = [("title", title)]
     for part in parts:
-        texts += [("name", part.name), ("material", part.material)]
-        texts += [(f"setting of body {part.name!r}", s) for s in (*part.settings.keys(), *part.settings.values())]
         _check_part(part)
-    for what, text in texts:
+    for what, text in _texts(title, parts):
         if wrong := _NOT_XML.search(text):
             raise BadInput(f"{what} {text!r} has the character {wrong[0]!r}, which a 3MF cannot hold: remove it")
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
-from sensorgen.measure.csv_table import checked_head
+from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import files
 from sensorgen.measure.log.entries import BenchRun, Entry
 from sensorgen.measure.log.logbook import Log

@@ -14,7 +14,8 @@ from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput, UnknownName, within
 from sensorgen.core.records import shown
 from sensorgen.measure import accuracy, csv_table, lcr
-from sensorgen.measure.csv_table import CsvTable, checked_head
+from sensorgen.measure.csv_table import CsvTable
+from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import exchange, files, notes, prints
 from sensorgen.measure.log.entries import Entry, RawFile, Reading
 from sensorgen.measure.log.logbook import Log

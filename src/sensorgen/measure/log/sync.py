@@ -24,7 +24,7 @@ from sensorgen.core.records import shown
 from sensorgen.measure.log import files
 from sensorgen.measure.log.chain import Record
 from sensorgen.measure.log.entries import NAMES, RawFile, decode
-from sensorgen.measure.log.logbook import Log
+from sensorgen.measure.log.logbook import Log, Merging
 
 MOST_BYTES = 2_000_000_000  # of an archive when unpacked
 MOST_LINE = 100_000_000  # bytes of one record
@@ -151,6 +151,15 @@ def _unpack(place: Path, folder: Path) -> None:
         raise BadInput(f"{str(place)!r} is no archive of a log: {str(error)[:80]}") from None
 
 
+def _left(merging: Merging, stuck: Sequence[tuple[Path, int]]) -> set[str]:
+    """Records that still follow a missing one, after all others of the files have been taken."""
+    left, before = set[str](), -1
+    while stuck and before < merging.added:
+        before = merging.added
+        left = {record.id for start in stuck for record, *_ in _records(*start) if merging.take(record)}
+    return left
+
+
 def _pull(log: Log, folder: Path, notes: list[str]) -> tuple[int, bytearray]:
     """Add what the folder has: number of new records, and which records it had. Notes grow by what is incomplete.
 
@@ -167,10 +176,7 @@ def _pull(log: Log, folder: Path, notes: list[str]) -> tuple[int, bytearray]:
                     waiting.setdefault(missing, []).append((path, at))
                     break
                 ready += waiting.pop(record.id, [])
-        stuck, left, before = list(itertools.chain(*waiting.values())), set[str](), -1
-        while stuck and before < merging.added:  # what does not follow a missing record
-            before = merging.added
-            left = {record.id for start in stuck for record, *_ in _records(*start) if merging.take(record)}
+        left = _left(merging, list(itertools.chain(*waiting.values())))
     if left:
         notes.append(f"{len(left)} records follow others that are not there yet; sync again when they are")
     return merging.added, merging.offered

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sensorgen.core.errors import BadInput, within
-from sensorgen.measure.csv_table import checked_head
+from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording import samples
 from sensorgen.measure.recording.samples import (
     MOST_TONES,

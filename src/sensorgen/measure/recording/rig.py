@@ -20,7 +20,8 @@ import numpy as np
 
 from sensorgen.core.errors import BadInput
 from sensorgen.measure import csv_table
-from sensorgen.measure.csv_table import SAME_NAMES, CsvTable, checked_head, listed
+from sensorgen.measure.csv_table import SAME_NAMES, CsvTable, listed
+from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording.samples import MAX_SKEW, Bools, Complex, Real, Recording
 from sensorgen.measure.recording.spool import MOST_BYTES
 

@@ -40,16 +40,20 @@ def beside(frame: ViewFrame, lanes: Sequence[Sequence[Measure]]) -> Iterator[str
         for z in _ends(lane):
             yield line("thin", frame.left - 1, frame.y(z), x - 1, frame.y(z))
     for k, (x, lane) in enumerate(lanes_at):
-        passing = [frame.y(z) for further in lanes[k + 1 :] for z in _ends(further)]
-        falling = [(m, frame.y(m.low_mm), frame.y(m.high_mm)) for m in lane[::-1]]  # the page counts downwards
-        wanted = [_beside_lines((low + high) / 2, passing) for _, low, high in falling]
-        values = spread(wanted, [2.8] * len(lane), frame.top - 6, frame.bed + 6)
-        for (m, low, high), place in zip(falling, values, strict=True):
-            yield _distance((x, low), (x, high))
-            outside = not high <= place <= low
-            if outside:
-                yield line("thin", x, (low + high) / 2, x - 2.2, place)
-            yield text("end halo", x - (2.5 if outside else 1.2), place + 0.9, number(m.value_mm))
+        yield from _lane(frame, x, lane, [frame.y(z) for further in lanes[k + 1 :] for z in _ends(further)])
+
+
+def _lane(frame: ViewFrame, x: float, lane: Sequence[Measure], passing: Sequence[float]) -> Iterator[str]:
+    """Vertical measures with their values, which keep clear of lines that pass at some heights [mm on the page]."""
+    falling = [(m, frame.y(m.low_mm), frame.y(m.high_mm)) for m in lane[::-1]]  # the page counts downwards
+    wanted = [_beside_lines((low + high) / 2, passing) for _, low, high in falling]
+    values = spread(wanted, [2.8] * len(lane), frame.top - 6, frame.bed + 6)
+    for (m, low, high), place in zip(falling, values, strict=True):
+        yield _distance((x, low), (x, high))
+        outside = not high <= place <= low
+        if outside:
+            yield line("thin", x, (low + high) / 2, x - 2.2, place)
+        yield text("end halo", x - (2.5 if outside else 1.2), place + 0.9, number(m.value_mm))
 
 
 def _ends(row: Sequence[Measure]) -> dict[float, float]:
@@ -71,12 +75,17 @@ def rows(frame: ViewFrame, measures: Sequence[Sequence[Measure]], start: float, 
         for u, z in sorted(_ends(row).items()):
             yield seen("thin", frame.x(u), frame.y(z), frame.x(u), y + beyond)
     for y, row in rows_at:
-        sizes = [width(number(m.value_mm)) for m in row]
-        middles = [frame.x((m.low_mm + m.high_mm) / 2) for m in row]
-        pitch = [0.0, *((a + b) / 2 + 0.8 for a, b in pairwise(sizes))]
-        for m, place in zip(row, spread(middles, pitch, frame.left, frame.right + 20), strict=True):
-            yield _distance((frame.x(m.low_mm), y), (frame.x(m.high_mm), y))
-            yield text("middle halo", place, y - 0.8, number(m.value_mm))
+        yield from _row(frame, y, row)
+
+
+def _row(frame: ViewFrame, y: float, row: Sequence[Measure]) -> Iterator[str]:
+    """Horizontal measures with their values, which keep apart from one another."""
+    sizes = [width(number(m.value_mm)) for m in row]
+    middles = [frame.x((m.low_mm + m.high_mm) / 2) for m in row]
+    pitch = [0.0, *((a + b) / 2 + 0.8 for a, b in pairwise(sizes))]
+    for m, place in zip(row, spread(middles, pitch, frame.left, frame.right + 20), strict=True):
+        yield _distance((frame.x(m.low_mm), y), (frame.x(m.high_mm), y))
+        yield text("middle halo", place, y - 0.8, number(m.value_mm))
 
 
 def _fits(frame: ViewFrame, row: Sequence[Measure]) -> bool:

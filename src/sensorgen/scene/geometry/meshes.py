@@ -178,13 +178,19 @@ def _cap(outline: Outline) -> Whole:
     return np.asarray(manifold3d.triangulate([np.array(outline)]), np.int64)
 
 
-def _grid(boxes: Sequence[Piece]) -> Mesh:
-    """Outer faces of boxes, on the grid of all their coordinates."""
-    lines = [np.unique([edge for p in boxes for edge in p.span(axis)]) for axis in "xyz"]
+def _filled(boxes: Sequence[Piece], lines: Sequence[Real]) -> Mask:
+    """Cells between the lines of a grid that boxes fill, (x, y, z)."""
     filled = np.zeros([len(line) - 1 for line in lines], bool)
     for p in boxes:
         ends = (np.searchsorted(line, p.span(axis)) for line, axis in zip(lines, "xyz", strict=True))
         filled[tuple(slice(low, high) for low, high in ends)] = True
+    return filled
+
+
+def _grid(boxes: Sequence[Piece]) -> Mesh:
+    """Outer faces of boxes, on the grid of all their coordinates."""
+    lines = [np.unique([edge for p in boxes for edge in p.span(axis)]) for axis in "xyz"]
+    filled = _filled(boxes, lines)
     # Which of the eight cells around each grid point are filled, as bits x + 2 y + 4 z
     padded = np.pad(filled, 1).astype(np.uint8)
     around = np.zeros([n + 1 for n in filled.shape], np.uint8)
