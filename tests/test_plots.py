@@ -15,6 +15,7 @@ import pytest
 from drawn_sensor import sensor_of
 
 from sensorgen.analysis import plots
+from sensorgen.analysis.plots import figure as figure_data
 from sensorgen.analysis.plots import pages, static
 from sensorgen.analysis.plots.figure import Map, frequency, scale
 from sensorgen.analysis.plots.response import (
@@ -224,9 +225,9 @@ def test_a_sensor_that_a_press_does_not_move_is_drawn_too():
 
 
 def test_a_missing_library_is_named(monkeypatch):
-    monkeypatch.setattr(plots.importlib.util, "find_spec", lambda name: None if name == "plotly" else name)
+    monkeypatch.setattr(figure_data.importlib.util, "find_spec", lambda name: None if name == "plotly" else name)
     with pytest.raises(MissingValue, match=r"plots need plotly: pip install plotly"):
-        plots.needed("matplotlib", "plotly")
+        figure_data.needed("matplotlib", "plotly")
 
 
 def decoded(values):

@@ -78,7 +78,7 @@ class Printed:
     def cells(self) -> dict[str, PrintCell]:
         """The unit cell by every convention."""
         from sensorgen.asprinted.window import Window, inside, window
-        from sensorgen.scene.sections import is_open
+        from sensorgen.scene.slabs import is_open
 
         whole = self.design.unbordered.printed
         boundaries = self.design.layers.boundaries_mm(whole.size_mm[2])

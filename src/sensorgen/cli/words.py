@@ -161,7 +161,7 @@ class Png(Word):
         """Take a file that ends in .png; raise MissingValue where Matplotlib is not installed."""
         if not text.lower().endswith(".png"):
             raise BadInput(f"{text}: expected a file that ends in .png")
-        from sensorgen.analysis.plots import needed
+        from sensorgen.analysis.plots.figure import needed
 
         needed("matplotlib")
         return Path(text)

@@ -43,7 +43,7 @@ def _of_design(
     output, --output, -o : DIR
         Folder of the files.
     """
-    from sensorgen.analysis.plots import needed
+    from sensorgen.analysis.plots.figure import needed
     from sensorgen.core import files as store
     from sensorgen.core.document import to_json
     from sensorgen.prediction.query import Query
@@ -91,7 +91,7 @@ def _of_scenes(
     import csv
     import io
 
-    from sensorgen.analysis.plots import needed
+    from sensorgen.analysis.plots.figure import needed
     from sensorgen.core import files as store
     from sensorgen.verification import chart
     from sensorgen.verification.chart import plot

@@ -1,26 +1,10 @@
 """Figures: described once as data, drawn as pictures or on a page for the browser."""
 
-import importlib.util
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from sensorgen.core.errors import MissingValue
-
 if TYPE_CHECKING:
     from sensorgen.models.sensor import Sensor
-
-
-def needed(*names: str) -> None:
-    """Refuse to go on without a library.
-
-    Raises
-    ------
-    MissingValue
-        It is not installed.
-    """
-    missing = [name for name in names if importlib.util.find_spec(name) is None]
-    if missing:
-        raise MissingValue(f"plots need {' and '.join(missing)}: pip install {' '.join(missing)}")
 
 
 PAGE, IDENTIFIABILITY = "predict.html", "identifiability.png"
@@ -53,6 +37,7 @@ def files(
         Matplotlib or Plotly is not installed.
     """
     from sensorgen.analysis.plots import pages, response, static
+    from sensorgen.analysis.plots.figure import needed
 
     needed("matplotlib", "plotly")
     answer = response.response(sensor, frequency_hz, force_n, position_mm)

@@ -1,5 +1,6 @@
 """Figures as data with units: ``static`` draws them as PNG and SVG, ``interactive`` as data for Plotly's script."""
 
+import importlib.util
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.core.errors import MissingValue
 
 BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, GREY = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a8f98",
@@ -265,3 +267,16 @@ def thinned_together(z: Complex, which: Mask | None = None) -> NDArray[np.intp]:
     columns = (column if which is None else column[which] for column in z.T)
     samples = [thinned(part) for column in columns for part in (column.real, column.imag)]
     return np.unique(np.concatenate(samples))
+
+
+def needed(*names: str) -> None:
+    """Refuse to go on without a library.
+
+    Raises
+    ------
+    MissingValue
+        It is not installed.
+    """
+    missing = [name for name in names if importlib.util.find_spec(name) is None]
+    if missing:
+        raise MissingValue(f"plots need {' and '.join(missing)}: pip install {' '.join(missing)}")

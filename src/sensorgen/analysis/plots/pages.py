@@ -98,7 +98,7 @@ def page(
     MissingValue
         Plotly is not installed, and there are figures.
     """
-    from sensorgen.analysis.plots import needed
+    from sensorgen.analysis.plots.figure import needed
     from sensorgen.analysis.plots.interactive import data, height_px
 
     figures = [figure for section in sections for figure in section.figures]

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sensorgen.analysis.plots import needed
-from sensorgen.analysis.plots.figure import GREY, SYMBOLS, Axis, BodyTriangles, Curve, Figure, Map, Panel
+from sensorgen.analysis.plots.figure import GREY, SYMBOLS, Axis, BodyTriangles, Curve, Figure, Map, Panel, needed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
