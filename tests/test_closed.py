@@ -6,7 +6,7 @@ from math import log
 import numpy as np
 import pytest
 
-from sensorgen.analysis.plots.compression import figure
+from sensorgen.analysis.plots.results import compression_figure
 from sensorgen.core.bounds import Interval
 from sensorgen.design.design import make
 from sensorgen.models import closed
@@ -105,5 +105,5 @@ def test_compress_has_bounds_beyond_the_last_solved_pressure():
     rise, off = (np.array(values[3:]) for values in (result.rise_f_per_m2, result.rise_error_f_per_m2))
     assert (rise + off >= np.array(result.upper_f_per_m2[3:]) - result.upper_f_per_m2[0]).all()
     assert "from 10 to 1100 kPa the cell was not solved" in result.doubts[0]
-    assert [len(panel.content[0].x) for panel in figure(result).choices[""]] == [3, 5]
+    assert [len(panel.content[0].x) for panel in compression_figure(result).choices[""]] == [3, 5]
     assert any("converged up to 10 kPa, bounds up to 1100 kPa" in str(part) for part in result.document())
