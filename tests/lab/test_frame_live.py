@@ -283,7 +283,7 @@ def test_the_command_names_swapped_wires_and_refuses_crossings_that_are_not_ther
     words = ("--simulate", "--rate", "50", "--unloaded", "2", "--seconds", "1", "--no-page", "--press")
     code, _, text = run_all(folder, "bench", "array", "a.yaml", *words, "r2c3")
     assert code == 0
-    assert "no press on r2c3 of 20 frames" in text
+    assert "no press of 20 frames" in text
     code, _, text = run_all(folder, "bench", "array", "a.yaml", *words, "r9c3")
     assert code == 2
     assert "r9c3; expected r1c1 to r5c6" in text

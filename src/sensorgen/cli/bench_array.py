@@ -17,6 +17,8 @@ from sensorgen.prediction.query import Noise
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
     from sensorgen.measure.lab.devices import Clock, FrameMeter
+    from sensorgen.measure.lab.frame_live import FrameFeed, KnownPress
+    from sensorgen.prediction.array.live import LiveMaps
     from sensorgen.prediction.array.model import ArrayModel
     from sensorgen.prediction.array.readout import ArrayReadout
 
@@ -67,9 +69,8 @@ def _array(
         Show it in the browser.
     """
     from sensorgen.cli.inversion import known
-    from sensorgen.measure.array_frames import crossings
     from sensorgen.measure.lab.devices import RealClock
-    from sensorgen.measure.lab.frame_live import PRESS_FRAMES, FrameFeed, KnownPress, MapView, follow, recorder
+    from sensorgen.measure.lab.frame_live import FrameFeed, MapView, follow, recorder
     from sensorgen.prediction.array.live import LiveMaps
     from sensorgen.prediction.array.model import array_model
     from sensorgen.prediction.array.readout import ArrayReadout
@@ -79,8 +80,7 @@ def _array(
     _refuse_times(seconds, unloaded_s)
     refuse_input(readout)
     model, clock = array_model(design), RealClock()
-    with within("--press"):
-        first = KnownPress(crossings((press,), model.here.shape)[press]) if press else None
+    first = _first_press(press, model.here.shape)
     _ = model.regions  # refused before a device is opened
     how = ArrayReadout(readout, input_ohm, (_FREQUENCY_HZ,), noise)  # type: ignore[arg-type]
     meter = _virtual(model, how, rate_hz, faults, clock) if simulate else _device(kind, port, clock)
@@ -103,12 +103,28 @@ def _array(
         reader.start()
         with suppress(KeyboardInterrupt):
             follow(feed, live, view, clock, clock.now() + seconds, first)
+    _report(feed, live, first)
+    return 0
+
+
+def _report(feed: "FrameFeed", live: "LiveMaps", first: "KnownPress | None") -> None:
+    """Say what came, and what the known press showed."""
+    from sensorgen.measure.lab.frame_live import PRESS_FRAMES
+
     counts = ", ".join(f"{count} {name}" for name, count in feed.counts.items())
     by = f"by {live.plan.words()}" if live.tared else "no frame at rest: give --unloaded S, seconds without a load"
     if first:
-        render.say(first.words() or f"no press on {press} of {PRESS_FRAMES} frames", err=True)
+        render.say(first.words() or f"no press of {PRESS_FRAMES} frames: nothing is known of the wires", err=True)
     render.say(f"{counts}, {live.dropped} not inverted; {by}", err=True)
-    return 0
+
+
+def _first_press(crossing: str, shape: tuple[int, int]) -> "KnownPress | None":
+    """The press on a crossing by its name; BadInput of one that the array has not."""
+    from sensorgen.measure.array_frames import crossings
+    from sensorgen.measure.lab.frame_live import KnownPress
+
+    with within("--press"):
+        return KnownPress(crossings((crossing,), shape)[crossing]) if crossing else None
 
 
 def _refuse_times(seconds: float, unloaded_s: float) -> None:

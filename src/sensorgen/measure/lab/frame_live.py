@@ -257,9 +257,9 @@ class KnownPress:
     at: tuple[int, int]
     _read: "list[Whole]" = field(default_factory=list)
 
-    def take(self, maps: "PressureMaps") -> None:
-        """The places of the largest pressures of the first loaded frames."""
-        for kpa, sigma in zip(maps.pressure_kpa, maps.sigma_kpa, strict=True):
+    def take(self, maps: "PressureMaps | None") -> None:
+        """Take the places of the largest pressures of the first loaded frames."""
+        for kpa, sigma in zip(maps.pressure_kpa, maps.sigma_kpa, strict=True) if maps else ():
             peak = np.nan_to_num(kpa, nan=-np.inf)
             place = np.unravel_index(peak.argmax(), peak.shape)
             if len(self._read) < PRESS_FRAMES and peak[place] > _SIGMAS * sigma[place]:
@@ -324,7 +324,7 @@ def follow(
         feed.obey(view.commands() if view else ())
         frames = feed.taken()
         maps = live.take(*frames) if len(frames[1]) and not feed.paused else None
-        if press and maps:
+        if press:
             press.take(maps)
         if view:
             view.show(clock.now(), maps, _words(feed, live, press))

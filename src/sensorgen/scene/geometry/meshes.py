@@ -287,7 +287,7 @@ def _fault(body: Body, mesh: Mesh) -> str:
 
     exact, got, off = body.volume_mm3(), mesh.volume_mm3(), _off_mm(body)
     is_sound = _two_manifold(mesh)
-    near = _near(mesh) if is_sound else mesh
+    near = _near(mesh)
     are_apart = is_sound and len(mesh.triangles) > _MANY and not len(near.triangles)
     status = manifold3d.Error.NoError if are_apart else mesh.solid().status()
     if status != manifold3d.Error.NoError:
@@ -297,7 +297,7 @@ def _fault(body: Body, mesh: Mesh) -> str:
     area = mesh.area_mm2()
     if abs(got - exact) > 1e-9 * exact + off * area:  # rounding, and chords in place of arcs
         return f"encloses {got:.9g} mm3, not {exact:.9g} mm3"
-    if len(near.triangles) and (twice := _self_overlap_mm3(near.solid())) > (OVERLAP_MM + off) * area:
+    if (twice := _self_overlap_mm3(near.solid())) > (OVERLAP_MM + off) * area:
         return f"overlaps itself by {twice:.3g} mm3"
     box = [*mesh.vertices_mm.min(0), *mesh.vertices_mm.max(0)]
     return "" if np.allclose(box, _box_mm(body), rtol=0.0, atol=OVERLAP_MM + off) else "is not where it is drawn"
@@ -361,9 +361,8 @@ def _near(mesh: Mesh) -> Mesh:
     one, other = shapely.STRtree(plans).query(plans)
     shared = np.minimum(high[one], high[other]) - np.maximum(low[one], low[other])
     near = np.isin(label, label[order][starts][one[(shared > OVERLAP_MM).all(1) & (one != other)]])
-    return Mesh(
-        mesh.vertices_mm[near], (np.cumsum(near) - 1)[mesh.triangles[near[mesh.triangles[:, 0]]]].astype(np.int32)
-    )
+    triangles = (np.cumsum(near) - 1)[mesh.triangles[near[mesh.triangles[:, 0]]]]
+    return Mesh(mesh.vertices_mm[near], triangles.astype(np.int32))
 
 
 def _overlaps(solids: Mapping[str, "manifold3d.Manifold"], off_mm: Mapping[str, float]) -> list[tuple[str, str]]:
