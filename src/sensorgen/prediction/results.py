@@ -207,7 +207,7 @@ class ErrorBudget:
             yield f"accuracy {self.accuracy:g} of |Z| not reached by the models{beyond}"
 
     def _by_one(self) -> Iterator[str]:
-        """What is left of R at its worst without one term that is nearly all of it, as one over D squared is."""
+        """Remainder of R at its worst without one term that is nearly all of it, as one over D squared is."""
         known = [t for t in self.terms if t.changes]
         most = max(known, key=lambda t: (t.changes or Changes()).re, default=None)
         left = sum((t.changes or Changes()).re for t in known if t is not most)
