@@ -12,7 +12,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.design import load
 from sensorgen.measure.array_frames import read
 from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock
-from sensorgen.measure.lab.frame_live import FrameFeed, KnownPress, MapView, follow, recorder
+from sensorgen.measure.lab.frame_live import FrameFeed, MapView, NamedPress, follow, recorder
 from sensorgen.measure.lab.frame_stream import FrameForm, FrameStream
 from sensorgen.measure.lab.port import SimulatedPort
 from sensorgen.measure.virtual.array import FrameSender, simulated, walked
@@ -267,7 +267,7 @@ def test_a_known_press_names_swapped_wires(model, order, words):
     load_kpa = np.zeros((REST + 80, 5, 6))
     load_kpa[REST + 5 : REST + 30, 1, 2] = 100.0
     load_kpa[REST + 30 :, 4, 0] = 100.0
-    readout, press = ArrayReadout(frequency_hz=(1e4,)), KnownPress((1, 2))
+    readout, press = ArrayReadout(frequency_hz=(1e4,)), NamedPress((1, 2))
     siemens = simulated(model, readout, load_kpa)[:, :, order]
     rest = np.arange(len(load_kpa)) < REST
     live = LiveMaps(model, readout)

@@ -17,7 +17,7 @@ from sensorgen.prediction.query import Noise
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
     from sensorgen.measure.lab.devices import Clock, FrameMeter
-    from sensorgen.measure.lab.frame_live import FrameFeed, KnownPress
+    from sensorgen.measure.lab.frame_live import FrameFeed, NamedPress
     from sensorgen.prediction.array.live import LiveMaps
     from sensorgen.prediction.array.model import ArrayModel
     from sensorgen.prediction.array.readout import ArrayReadout
@@ -107,7 +107,7 @@ def _array(
     return 0
 
 
-def _report(feed: "FrameFeed", live: "LiveMaps", first: "KnownPress | None") -> None:
+def _report(feed: "FrameFeed", live: "LiveMaps", first: "NamedPress | None") -> None:
     """Say what came, and what the known press showed."""
     from sensorgen.measure.lab.frame_live import PRESS_FRAMES
 
@@ -118,13 +118,13 @@ def _report(feed: "FrameFeed", live: "LiveMaps", first: "KnownPress | None") -> 
     render.say(f"{counts}, {live.dropped} not inverted; {by}", err=True)
 
 
-def _first_press(crossing: str, shape: tuple[int, int]) -> "KnownPress | None":
+def _first_press(crossing: str, shape: tuple[int, int]) -> "NamedPress | None":
     """The press on a crossing by its name; BadInput of one that the array has not."""
     from sensorgen.measure.array_frames import crossings
-    from sensorgen.measure.lab.frame_live import KnownPress
+    from sensorgen.measure.lab.frame_live import NamedPress
 
     with within("--press"):
-        return KnownPress(crossings((crossing,), shape)[crossing]) if crossing else None
+        return NamedPress(crossings((crossing,), shape)[crossing]) if crossing else None
 
 
 def _refuse_times(seconds: float, unloaded_s: float) -> None:

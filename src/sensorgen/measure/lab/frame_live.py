@@ -245,7 +245,7 @@ class FrameFeed:
 
 
 @dataclass(eq=False)
-class KnownPress:
+class NamedPress:
     """The first press on an array, on a crossing that the operator names: another that reads it shows swapped wires.
 
     Attributes
@@ -311,7 +311,7 @@ class MapView(LiveView):
 
 def follow(
     feed: FrameFeed, live: "LiveMaps", view: "MapView | None", clock: Clock, until_s: float,
-    press: "KnownPress | None" = None,
+    press: "NamedPress | None" = None,
 ) -> None:  # fmt: skip
     """Invert and show what a feed brings, until a time, a command or a fault.
 
@@ -334,7 +334,7 @@ def follow(
             clock.wait_until(clock.now() + _IDLE_S)
 
 
-def _words(feed: FrameFeed, live: "LiveMaps", press: "KnownPress | None") -> dict[str, Any]:
+def _words(feed: FrameFeed, live: "LiveMaps", press: "NamedPress | None") -> dict[str, Any]:
     by = live.plan.words() if live.tared else "not tared: unload the array, and press Unloaded"
     by = "; ".join(filter(None, (press.words() if press else "", by)))
     recording = None if feed.recorder is None else feed.recording
