@@ -49,6 +49,7 @@ STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)), 1.2e5)  # 6 N on a tip 
 _FURTHER = 1.25  # ratio of stresses beyond those
 _PAST = 1.25  # pressure over the last one of a stored curve up to which it is extended [-]
 _COARSE = (0.0, 0.25, 0.5, 1.0)  # stresses at which tops are compared, over the last one [-]
+_CLOSED = 8  # pressures beyond the last solved one, at which the closed cell bounds a curve
 _PERIODS = 1.5  # height of a block, over the period, above which its pressure is even: exp(-3 pi) [-]
 _HEIGHTS = 2.0  # the same over the cell's height, where no period is known [-]
 _LANDING = f"feet land at negligible force: the rise of C up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
@@ -506,13 +507,16 @@ def _further(
     last_pa, (least, upper) = own.stress_pa[-1], _ends(own)
     if not at_rest or until_pa <= last_pa:
         return law
+    highest = upper
     try:
-        most = closed_f_per_m2(case, until_pa) / at_rest.lower
+        for pressure_pa in np.linspace(last_pa, until_pa, _CLOSED + 1)[1:].tolist():  # a cell may close at any of them
+            ratio = max(closed_f_per_m2(case, pressure_pa) / at_rest.lower, highest.ratio[-1])
+            slope = (ratio - highest.ratio[-1]) / (pressure_pa - highest.stress_pa[-1])
+            highest = extended(highest, pressure_pa, slope)
     except ValueError:
         return law
-    most = max(most, upper.ratio[-1])
-    slope, highest = ((most - c.ratio[-1]) / (until_pa - last_pa) for c in (own, upper))
-    slope = min(own.slope_per_pa[-1], slope)
+    most = highest.ratio[-1]
+    slope = min(own.slope_per_pa[-1], (most - own.ratio[-1]) / (until_pa - last_pa))
     between = extended(own, until_pa, slope)
     doubt = (
         f"from {last_pa / 1e3:.3g} to {until_pa / 1e3:.4g} kPa the rise of C lies between none more, "
@@ -522,7 +526,7 @@ def _further(
         law,
         compression=between,
         doubts=(*law.doubts, doubt),
-        others=(extended(least, until_pa, 0.0), extended(upper, until_pa, highest)),
+        others=(extended(least, until_pa, 0.0), highest),
         tops={name: _as_far(top, between) for name, top in tops.items()},
         of_mesh=tuple(extended(c, until_pa, slope) for c in (least, upper)),
     )
