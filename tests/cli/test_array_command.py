@@ -83,7 +83,7 @@ def test_the_shape_has_options_like_others(run):
         (("array", "a.yaml", "--readout", "two-terminal", "--input", "20"), "--input is of the guarded readout"),
         (("invert", "a.yaml", "f.csv", "--readout", "two-terminal", "--input", "20"), "--input is of the guarded"),
         (("array", "array", "--rows", "1.5"), "rows is 1.5; expected a whole number"),
-        (("check", "array", "--pitch-x", "4mm"), "leaves no space between columns"),
+        (("check", "array", "--pitch-x", "4mm", "--column", "4mm"), "leaves no space between columns"),
         (("invert", "a.yaml", "none.npz"), "none.npz"),
         (("invert", "a.yaml", "f.csv", "--perfect"), "--perfect is for lines"),
         (("invert", "a.yaml", "f.csv"), "no frequency of the readings"),

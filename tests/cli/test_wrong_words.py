@@ -130,7 +130,10 @@ def test_too_large_for_the_bed(run, tmp_path):
     assert said.code == 1
     assert "330 x 330 mm do not fit on the bed of diabase-h5, 390 x 170 mm" in said.line
     assert "nothing was written" in said.line
-    assert said.out.startswith("CHANGE  trix-d0.2-length330-width330: 1 error\n\nerror  8-bed  sensor")
+    assert said.out.startswith(
+        "CHANGE  trix-d0.2-length330-width330: 1 error; estimated (PrusaSlicer, Arachne\n  walls)"
+    )
+    assert "\n\nerror  8-bed  sensor" in said.out
     assert list(tmp_path.iterdir()) == []
 
 

@@ -708,7 +708,7 @@ def name_of(design: Design) -> str:
     >>> name_of(Design(shape="rect", parameters={"along": "yx", "length_mm": 50}, quality="extrafine"))
     'sqyx-d0.2-length50-extrafine'
     """
-    params, default = design.params, Design(shape=design.shape)
+    params, default = design.params, Design.model_construct(shape=design.shape)
     parts, named = [getattr(design.form, "SHORT", design.shape) + str(getattr(params, "along", ""))], {"along"}
     if hasattr(params, "along"):
         parts.append(f"d{params.dielectric_mm:.10g}")  # type: ignore[attr-defined]
