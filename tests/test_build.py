@@ -16,6 +16,7 @@ from sensorgen.design import design, shapes
 from sensorgen.export.threemf import FAMILIES
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.workflows import build as workflow
+from sensorgen.workflows import decision
 from sensorgen.workflows.build import build
 
 DESIGNS = Path(__file__).parents[1] / "designs"
@@ -172,7 +173,7 @@ def test_a_crossing_is_predicted_in_another_process_to_the_same_files(tmp_path, 
             monkeypatch.setattr(workflow, "evaluate", known_only)
         else:
             monkeypatch.setattr(workflow, "evaluate", evaluate)
-            monkeypatch.setattr(workflow, "_is_known", lambda _: True)
+            monkeypatch.setattr(decision, "is_known", lambda _: True)
         build(array, tmp_path / f"{ahead}", cad=False, force=True)
         found.append(contents(tmp_path / f"{ahead}"))
     assert found[0] == found[1]

@@ -37,8 +37,12 @@ def check_command(design: "Design", advising: Advising, *, strict: Strict = Fals
     from sensorgen.workflows import decision
 
     budget_s = advising.budget
-    with render.progress((*STEPS, *decision.STEPS)) as step:
+    with (
+        decision.beside(design, predict=budget_s > 0) as predicted_ahead,
+        render.progress((*STEPS, *decision.STEPS)) as step,
+    ):
         review = reviewed(design, step)
+        predicted_ahead()
         decided = decision.decision(design, review, budget_s, predict=budget_s > 0, step=step, decided=_shown)
     if not render.early():
         render.deliver(decided)

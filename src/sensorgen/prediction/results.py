@@ -301,10 +301,12 @@ class UnderTop:
             on_bench(self.position_resolution, known.sigma_position_m),
         )
 
-    def words(self) -> str:
-        """Name, and standard errors after known presses."""
-        values = (b.value for b in self.bench() if b)
-        return f"{self.name} {', '.join(si(v, u, 3) for v, u in zip(values, ('N', 'm'), strict=False))}"
+    def words(self, most_n: float = inf, length_m: float = inf) -> str:
+        """Name, standard errors after known presses; what cannot be told up to a force [N] and over a length [m]."""
+        force, position = self.bench()
+        known = ((force, "N", most_n, CANNOT_SENSE), (position, "m", length_m, CANNOT_LOCATE))
+        words = [si(b.value, u, 3) if b.value < GUESS * abs(most) else cannot for b, u, most, cannot in known if b]
+        return f"{self.name} {', '.join(words)}"
 
 
 @dataclass(frozen=True)
@@ -400,6 +402,11 @@ class Prediction(Displayed):
         own = (self.force_resolution, self.position_resolution, self.sensitivity)
         return self.tops or (UnderTop("", *own, *((known.calibrated, known.map.typical()) if known else ())),)
 
+    def by_top(self) -> str:
+        """Standard errors under each top, in words; "" where they do not differ."""
+        most = self.identifiability.most if self.identifiability else (inf, inf)
+        return "; ".join(top.words(*most) for top in self.tops)
+
     @property
     def conditional(self) -> bool:
         """True where it rests on values that no source gives."""
@@ -433,7 +440,7 @@ class Prediction(Displayed):
         yield Table("quantities", "", columns, tuple(rows))
         yield caption_of(self.force_n, self.position_m, self.body)
         if self.tops:
-            yield f"the worst of: {'; '.join(top.words() for top in self.tops)}"
+            yield f"the worst of: {self.by_top()}"
         if self.narrowing:
             columns = (Column("range that spans"), Column("a factor"), Column("narrowed most by"), Column("to"))
             rows_ = ((n.quantity, _times(n.factor), n.measurement, _times(n.left)) for n in self.narrowing)

@@ -3,8 +3,8 @@
 import json
 import platform
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, wait
-from contextlib import ExitStack, suppress
+from concurrent.futures import Future
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,7 +17,6 @@ from sensorgen.core.cache import Unknown, only_known
 from sensorgen.core.document import Part
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.findings import Finding, headline, listed, most_severe
-from sensorgen.core.parallel import open_lanes
 from sensorgen.core.version import __version__
 from sensorgen.design import printer
 from sensorgen.design.design import Design
@@ -172,11 +171,9 @@ def build(
     Unwritable, CadFailed, MissingValue
         See there; nothing was written.
     """
-    folder, ahead = out / design.name, list[Future[Any]]()
+    folder = out / design.name
     with ExitStack() as stack:
-        if design.layout and not _is_known(design.crossing):
-            (lane,) = stack.enter_context(open_lanes(1))
-            ahead.append(lane.submit(_predict, [(design.crossing,)]))  # beside slicing and checks of the whole array
+        predicted_ahead = stack.enter_context(decision.beside(design))
         review = reviewed(design, step, folder=folder)
         if review.errors(strict) and not force:
             raise Unprintable(review.findings, review.errors(strict), review.source)
@@ -189,7 +186,7 @@ def build(
             kernel = stack.enter_context(CadProcess())  # its import runs beside everything below
             job = kernel.submit(design.printed, _colours(design), design.name, stage / f"{design.name}.step")
         step("prediction")
-        wait(ahead)
+        predicted_ahead()
         predicted = evaluate(bodies.of_file(design, review.file))
         final = decision.decision(design, review, budget_s, step=step)
         built = Built(
@@ -211,7 +208,7 @@ def build(
 
 def _compared(asked: Design | None, now: Trial | None) -> str:
     """Effect of a compensation on the resolutions, as far as the print of what was asked for is predicted."""
-    if not (asked and now and _is_known(asked)):
+    if not (asked and now and decision.is_known(asked)):
         return compensation.NOT_COMPARED
     try:
         with only_known():
@@ -219,22 +216,6 @@ def _compared(asked: Design | None, now: Trial | None) -> str:
     except (Unknown, SensorgenError):
         return compensation.NOT_COMPARED
     return f"against the print of what was asked for: {words or 'it senses as that does'}"
-
-
-def _predict(design: Design) -> None:
-    """Predict a design, for the stored prediction alone."""
-    with suppress(SensorgenError):  # which the build itself meets and reports
-        evaluate(bodies.default_body(design))
-
-
-def _is_known(design: Design) -> bool:
-    """Test whether the prediction of a design is stored."""
-    try:
-        with only_known():
-            _predict(design)
-    except Unknown:
-        return False
-    return True
 
 
 def _replaced(folder: Path, design: Design) -> tuple[str, ...]:

@@ -1,16 +1,20 @@
 """Decision to print a design: verdict, the numbers that decide, findings, changes that were tried; and its page."""
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, wait
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from sensorgen.checks.review import STEPS as CHECKS
 from sensorgen.checks.review import CheckReport, Review, Step, report
+from sensorgen.core.cache import Unknown, only_known
 from sensorgen.core.document import Part
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Refused, headline, listed
-from sensorgen.core.parallel import used_s
+from sensorgen.core.parallel import open_lanes, used_s
 from sensorgen.design.design import Design
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
@@ -87,6 +91,33 @@ class RefusedBuild(Refused):
         if self.advice:
             yield ""
             yield from self.advice.document()
+
+
+@contextmanager
+def beside(design: Design, *, predict: bool = True) -> Iterator[Callable[[], object]]:
+    """Another process that predicts an array's crossing beside slicing and checks of the whole; a call waits for it."""
+    ahead = list[Future[Any]]()
+    with ExitStack() as stack:
+        if predict and design.layout and not is_known(design.crossing):
+            (lane,) = stack.enter_context(open_lanes(1))
+            ahead.append(lane.submit(_predict, [(design.crossing,)]))
+        yield partial(wait, ahead)
+
+
+def _predict(design: Design) -> None:
+    """Predict a design, for the stored prediction alone."""
+    with suppress(SensorgenError):  # which whoever asks for it meets and reports
+        evaluate(bodies.default_body(design))
+
+
+def is_known(design: Design) -> bool:
+    """Test whether the prediction of a design is stored."""
+    try:
+        with only_known():
+            _predict(design)
+    except Unknown:
+        return False
+    return True
 
 
 def decision(

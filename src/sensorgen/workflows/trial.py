@@ -83,7 +83,7 @@ class Numbers:
             found.gap, found.capacitance, found.resistance.get("top"), found.resistance.get("bottom"),
             worst("sensitivity"), worst("force_resolution"), worst("position_resolution"),
             *on_bench, typical("sigma_force_n"), typical("sigma_position_m"),
-            found.conditional, "; ".join(top.words() for top in found.tops),
+            found.conditional, found.by_top(),
         )  # fmt: skip
 
     def bench(self) -> tuple[Bounds | None, Bounds | None]:
