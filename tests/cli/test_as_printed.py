@@ -193,5 +193,5 @@ def test_a_compensation_that_senses_worse_says_so(monkeypatch):
         for n, m in ((0.1, 0.01), (0.2, 0.2))
     )
     monkeypatch.setattr(build, "trial", lambda *_, **__: fine)
-    monkeypatch.setattr(build, "_is_known", lambda _: True)
+    monkeypatch.setattr(build.decision, "is_known", lambda _: True)
     assert build._compared(asked, coarse).endswith(": force resolution 2 x worse, position resolution lost")

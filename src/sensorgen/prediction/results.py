@@ -302,7 +302,7 @@ class UnderTop:
         )
 
     def words(self, most_n: float = inf, length_m: float = inf) -> str:
-        """Name, standard errors after known presses; what cannot be told up to a force [N] and over a length [m]."""
+        """Name, standard errors after known presses; what cannot be done up to a force [N] and over a length [m]."""
         force, position = self.bench()
         known = ((force, "N", most_n, CANNOT_SENSE), (position, "m", length_m, CANNOT_LOCATE))
         words = [si(b.value, u, 3) if b.value < GUESS * abs(most) else cannot for b, u, most, cannot in known if b]
