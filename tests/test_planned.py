@@ -71,7 +71,7 @@ def test_a_cell_in_3d_has_an_interval_far_beyond_its_prototype():
 
 
 def test_the_printed_prototype_in_3d_is_stored_up_to_table_1_1():
-    """Its range holds what another program finds on two meshes, of the cell as drawn; other films have none stored."""
+    """Range of the stored law holds what another program gives on two meshes; other films have none stored."""
     large = json.loads((Path(__file__).parent / "reference" / "rect_rise.json").read_text("utf-8"))["large"]
     ends = {}
     for film_mm in (0.2, 0.1):
