@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import dist
 
 import shapely
 
@@ -149,6 +150,24 @@ def partition(bodies: Mapping[Region, shapely.Geometry], whole: shapely.Polygon,
     left, _, right, _ = (round(v, _DIGITS) for v in whole.bounds)
     kept = {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
     return ContactCell(kept, regions, left, right, mirrored=True, turned=turned)
+
+
+def joined(edges: Mapping[Edge, tuple[int, int]]) -> dict[Edge, tuple[int, int]]:
+    """Edges of which those that continue each other in a straight line are one; else a mesh is fine there, too."""
+    whole, at = dict(edges), dict[Point, list[Edge]]()
+    for edge in whole:
+        for place in edge:
+            at.setdefault(place, []).append(edge)
+    for place, here in at.items():
+        if len(here) != 2 or whole[here[0]] != whole[here[1]]:
+            continue
+        (a, b), (c, d) = sorted(here)
+        if b == c and abs((b[0] - a[0]) * (d[1] - c[1]) - (b[1] - a[1]) * (d[0] - c[0])) <= _SLIVER_MM * dist(a, d):
+            whole[a, d] = whole.pop((a, b))
+            del whole[c, d]
+            at[a] = [(a, d) if edge == (a, b) else edge for edge in at[a]]
+            at[d] = [(a, d) if edge == (c, d) else edge for edge in at[d]]
+    return whole
 
 
 def _add(edges: dict[Edge, tuple[int, int]], a: Point, b: Point, sides: tuple[int, int]) -> None:
