@@ -290,15 +290,18 @@ def _usual_ohm(
 ) -> Callable[[str, Predicted | None], float]:
     """Reading that is usual along an electrode of a shape and prediction [ohm].
 
-    The prediction times the median of measured over predicted of its shape, but no further than the prediction's range,
-    so that prints that all broke do not vouch for each other; the shape's median where none is predicted.
+    The prediction times the median of measured over predicted of its shape, of the readings within their predicted
+    ranges where there are any: else broken prints vouch for each other, and against a sound one. No further than the
+    prediction's range; the shape's median where none is predicted.
     """
-    ratios: dict[tuple[str, bool], array[float]] = {}
+    within: dict[tuple[str, bool], array[float]] = {}
+    every: dict[tuple[str, bool], array[float]] = {}
     for reading, of in zip(rows, of_rows, strict=True):
         alone = of.ry_ohm if of else None
-        over = [value / (alone.value if alone else 1.0) for value in least(_evidence(reading, None))]
-        ratios.setdefault((reading.shape, alone is not None), array("d")).extend(over)
-    medians = {key: expected_from(values) for key, values in ratios.items()}
+        ohm, key = least(_evidence(reading, None)), (reading.shape, alone is not None)
+        for ratios, known in ((every, ohm), (within, [r for r in ohm if alone and alone.lower <= r <= alone.upper])):
+            ratios.setdefault(key, array("d")).extend(r / (alone.value if alone else 1.0) for r in known)
+    medians = {key: expected_from(within[key] or values) for key, values in every.items()}
 
     def usual(shape: str, of: Predicted | None) -> float:
         alone = of.ry_ohm if of else None
