@@ -297,10 +297,11 @@ def _usual_ohm(
     within: dict[tuple[str, bool], array[float]] = {}
     every: dict[tuple[str, bool], array[float]] = {}
     for reading, of in zip(rows, of_rows, strict=True):
-        alone = of.ry_ohm if of else None
-        ohm, key = least(_evidence(reading, None)), (reading.shape, alone is not None)
-        for ratios, known in ((every, ohm), (within, [r for r in ohm if alone and alone.lower <= r <= alone.upper])):
-            ratios.setdefault(key, array("d")).extend(r / (alone.value if alone else 1.0) for r in known)
+        alone, ohm = of.ry_ohm if of else None, least(_evidence(reading, None))
+        in_range = [each for each in ohm if alone and alone.lower <= each <= alone.upper]
+        key, value = (reading.shape, alone is not None), alone.value if alone else 1.0
+        for ratios, known in ((every, ohm), (within, in_range)):
+            ratios.setdefault(key, array("d")).extend(each / value for each in known)
     medians = {key: expected_from(within[key] or values) for key, values in every.items()}
 
     def usual(shape: str, of: Predicted | None) -> float:

@@ -158,16 +158,22 @@ def joined(edges: Mapping[Edge, tuple[int, int]]) -> dict[Edge, tuple[int, int]]
     for edge in whole:
         for place in edge:
             at.setdefault(place, []).append(edge)
-    for place, here in at.items():
-        if len(here) != 2 or whole[here[0]] != whole[here[1]]:
+    for here in at.values():
+        if len(here) != 2 or whole[here[0]] != whole[here[1]] or not _in_line(*sorted(here)):
             continue
         (a, b), (c, d) = sorted(here)
-        if b == c and abs((b[0] - a[0]) * (d[1] - c[1]) - (b[1] - a[1]) * (d[0] - c[0])) <= _SLIVER_MM * dist(a, d):
-            whole[a, d] = whole.pop((a, b))
-            del whole[c, d]
-            at[a] = [(a, d) if edge == (a, b) else edge for edge in at[a]]
-            at[d] = [(a, d) if edge == (c, d) else edge for edge in at[d]]
+        whole[a, d] = whole.pop((a, b))
+        del whole[c, d]
+        for end, old in ((a, (a, b)), (d, (c, d))):
+            at[end].remove(old)
+            at[end].append((a, d))
     return whole
+
+
+def _in_line(first: Edge, second: Edge) -> bool:
+    """Test whether the second of two edges begins where the first ends, in its direction."""
+    (a, b), (c, d) = first, second
+    return b == c and abs((b[0] - a[0]) * (d[1] - c[1]) - (b[1] - a[1]) * (d[0] - c[0])) <= _SLIVER_MM * dist(a, d)
 
 
 def _add(edges: dict[Edge, tuple[int, int]], a: Point, b: Point, sides: tuple[int, int]) -> None:
