@@ -180,9 +180,9 @@ def _plan(
     where = (tip_mm / 2, length - tip_mm / 2)
     plan = schedule(RunPlan(seed, presses, (force_n[0], force_n[1]), where, dwell_s, rest_s, repeats), design.name)
     if picture:
-        from sensorgen.analysis.plots import recordings
+        from sensorgen.analysis.plots import recordings, static
 
-        files.replace(picture, recordings.schedule(list(plan.steps), plan.seconds))
+        files.replace(picture, static.png(recordings.schedule(list(plan.steps), plan.seconds)))
     table = "".join(render.pieces(plan, "csv"))
     if output:
         files.replace(output, table.encode())

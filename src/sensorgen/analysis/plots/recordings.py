@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sensorgen.analysis.plots import static
 from sensorgen.analysis.plots.figure import (
     BLUE,
     COLOURS,
@@ -190,8 +189,8 @@ def hysteresis(loads: Mapping[float, Hysteresis], tones_hz: Real, name: str) -> 
                   columns=2)  # fmt: skip
 
 
-def schedule(steps: Sequence[Step], seconds: float) -> bytes:
-    """Plan of a run: force over position in the order of the run, and force over time, as PNG."""
+def schedule(steps: Sequence[Step], seconds: float) -> Figure:
+    """Plan of a run: force over position in the order of the run, and force over time."""
     force, position = np.array([s.force_n for s in steps]), np.array([s.position_mm for s in steps])
     order = Map(position, force, np.arange(1.0, len(steps) + 1), "load")
     edges = [(0.0, 0.0)]
@@ -202,22 +201,7 @@ def schedule(steps: Sequence[Step], seconds: float) -> bytes:
     divisor, unit = (60.0, "min") if seconds > 600 else (1.0, "s")
     when = Curve("line", "", np.array(x) / divisor, y, colour=BLUE)
     panels = (Panel((order,), _POSITION, _FORCE), Panel((when,), Axis(f"time [{unit}]"), _FORCE))
-    return static.png(Figure("plan", f"{len(steps)} loads in {seconds:.0f} s", "The plan.", {"": panels}, columns=2))
-
-
-def over_time(run: DrawnRecording) -> bytes:
-    """Readings over time at each frequency, as PNG."""
-    return static.png(series(run))
-
-
-def surfaces(run: DrawnRecording, part: str) -> bytes:
-    """Change of "resistance" or "reactance" over force and position, at each frequency, as PNG."""
-    return static.png(differences(run, part))
-
-
-def normalised_differences(runs: Mapping[str, Pairs], tones_hz: Real, *, together: bool = False) -> bytes:
-    """Differences of several recordings on one scale from 0 to 1, as PNG."""
-    return static.png(compared(runs, tones_hz, together=together))
+    return Figure("plan", f"{len(steps)} loads in {seconds:.0f} s", "The plan.", {"": panels}, columns=2)
 
 
 def html(run: DrawnRecording) -> str:
