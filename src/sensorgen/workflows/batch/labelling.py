@@ -14,6 +14,7 @@ the dielectric and touches the sensor with its edge alone.
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 from markupsafe import Markup
 
@@ -160,12 +161,11 @@ def _lines(name: str, width_dots: float) -> list[str]:
     if lacking:
         raise BadInput(f"no letter {lacking[0]!r} for the tab of {name!r}; expected {''.join(sorted(FONT))}")
     most = int((width_dots - 2 * MARGIN_DOTS + 1 + 1e-9) // (LINE_DOTS + 1))
-    choices = [_broken(words, limit) for limit in sorted({dots(" ".join(words[a:b])) for a, b in _spans(len(words))})]
+    choices = [
+        _broken(words, limit)
+        for limit in sorted({dots(" ".join(words[a:b])) for a, b in combinations(range(len(words) + 1), 2)})
+    ]
     return next((lines for lines in choices if lines and len(lines) <= most), [])
-
-
-def _spans(count: int) -> Iterator[tuple[int, int]]:
-    return ((a, b) for a in range(count) for b in range(a + 1, count + 1))
 
 
 def _broken(words: Sequence[str], limit: int) -> list[str]:

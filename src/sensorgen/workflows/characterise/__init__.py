@@ -146,18 +146,14 @@ class Study:
             flows.append(made.speed_mm_s * made.line_mm * layers.layer_mm)
         lines = plates.lines_bodies(self.design, self.conductor, self.dielectric)
         volume = sum(c.volume_mm3 for c in chosen) + sum(body.volume_mm3() for body in lines)
-        tallest = max((_height_mm(c) for c in chosen), default=0.0)
+        heights = (s.drawn for c in chosen for s in c.sizes if s.key.startswith(("height_", "film_")))
+        tallest = max(heights, default=0.0)
         return (_SLOWER * volume / min(flows) + _CHANGE_S * tallest / layers.layer_mm) / 3600
 
 
 def _beside(word: str) -> str:
     """A name; of a path, the file's name in the plate's folder."""
     return f"./{Path(word).name}" if packs.is_path("printers", word) else word
-
-
-def _height_mm(coupon: Coupon) -> float:
-    keys = [s.drawn for s in coupon.sizes if s.key.startswith(("height_", "film_"))]
-    return max(keys)
 
 
 @dataclass(frozen=True)
