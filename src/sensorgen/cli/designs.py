@@ -36,8 +36,6 @@ class _TipOption:
 class DesignGroup(FirstWord):
     """A command whose first word is a shape or a design file; each shape brings its own options."""
 
-    thing, form = "shape", "{{SHAPE|DESIGN.yaml}} {option} ..."
-
     def __init__(
         self, name: str, work: Work, *more: click.Parameter, tip: bool = False, parts: Parts | None = None,
         **attributes: Any,
@@ -48,11 +46,14 @@ class DesignGroup(FirstWord):
         """
         super().__init__(
             name,
+            work,
+            thing="shape",
+            form="{{SHAPE|DESIGN.yaml}} {option} ...",
             subcommand_metavar="{SHAPE|DESIGN.yaml} [OPTIONS]",
             epilog="SHAPE --help lists the options of the shape and of its print, too.",
             **attributes,
         )
-        self.work, self.parts = work, parts or (lambda design, _: (design,))
+        self.parts = parts or (lambda design, _: (design,))
         self.own = [*(options_of(_TipOption) if tip else []), *options_of(work), *more]
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002

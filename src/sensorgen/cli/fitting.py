@@ -158,53 +158,46 @@ def _options(values: "Fit") -> str:
     return " ".join(f"--material {part}={name}@{values.source}" for name, part in parts.items())
 
 
-class _PrinterGroup(FirstWord):
-    """A command whose first word is a printer, or ``read``."""
+def _printer(
+    name: str, materials: tuple[str, ...], *, quality: str = "fine", tools: tuple[str, ...] = (), plate: str = "",
+    count: int = 12, hours: float = 4.0, out: Out = Path("out"),
+) -> "Documented":  # fmt: skip
+    """Choose coupons and write their plate's files.
 
-    thing, form = "printer", "PRINTER MATERIALS {option}"
+    Parameters
+    ----------
+    materials : MATERIALS
+    quality : NAME
+        Print quality.
+    tools, --tool : MATERIAL=NUMBER
+        Tool of a material.
+    plate, --name : NAME
+        Of the plate, and of its folder.
+    count
+        Most coupons.
+    hours
+        Longest print [h].
+    out
+        Folder of plates.
+    """
+    from sensorgen.workflows.characterise import STEPS, Study, plan
 
-    def of(self, name: str) -> click.Command:
-        """The command for a printer."""
-
-        @of_function(name, *render.options(folder=True))
-        def printer(
-            materials: tuple[str, ...], *, quality: str = "fine", tools: tuple[str, ...] = (), plate: str = "",
-            count: int = 12, hours: float = 4.0, out: Out = Path("out"),
-        ) -> "Documented":  # fmt: skip
-            """Choose coupons and write their plate's files.
-
-            Parameters
-            ----------
-            materials : MATERIALS
-            quality : NAME
-                Print quality.
-            tools, --tool : MATERIAL=NUMBER
-                Tool of a material.
-            plate, --name : NAME
-                Of the plate, and of its folder.
-            count
-                Most coupons.
-            hours
-                Longest print [h].
-            out
-                Folder of plates.
-            """
-            from sensorgen.workflows.characterise import STEPS, Study, plan
-
-            pairs = {word: word.partition("=") for word in tools}
-            if wrong := next((word for word, (_, _, number) in pairs.items() if not number.isdigit()), None):
-                raise BadInput(f"--tool {wrong!r}; expected MATERIAL=NUMBER, as in etpu=3")
-            names = [material for word in materials for material in word.split(",")]
-            numbers = {key: int(number) for key, _, number in pairs.values()}
-            with render.progress(STEPS) as step:
-                study = Study.of(name, names, quality=quality, tools=numbers)
-                return plan(study, out, name=plate, count=count, hours=hours, step=step)
-
-        return printer
+    pairs = {word: word.partition("=") for word in tools}
+    if wrong := next((word for word, (_, _, number) in pairs.items() if not number.isdigit()), None):
+        raise BadInput(f"--tool {wrong!r}; expected MATERIAL=NUMBER, as in etpu=3")
+    names = [material for word in materials for material in word.split(",")]
+    numbers = {key: int(number) for key, _, number in pairs.values()}
+    with render.progress(STEPS) as step:
+        study = Study.of(name, names, quality=quality, tools=numbers)
+        return plan(study, out, name=plate, count=count, hours=hours, step=step)
 
 
-characterise_command = _PrinterGroup(
+characterise_command = FirstWord(
     "characterise",
+    _printer,
+    *render.options(folder=True),
+    thing="printer",
+    form="PRINTER MATERIALS {option}",
     subcommand_metavar="{PRINTER MATERIALS|read FORM} [OPTIONS]",
     help="""Print test structures (coupons), and turn their readings into material values.
 
