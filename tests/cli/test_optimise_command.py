@@ -21,12 +21,11 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import Query
 from sensorgen.workflows.optimise import front, ladder, recommend, result
-from sensorgen.workflows.optimise.front import Front, search
+from sensorgen.workflows.optimise.front import Front, search, settled
 from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended
 from sensorgen.workflows.optimise.sample import _objectives, sample
 from sensorgen.workflows.optimise.space import MOST, candidates, space
 from sensorgen.workflows.optimise.target import Target, load
-from sensorgen.workflows.optimise.ties import settled
 from sensorgen.workflows.search import Candidate, EarlyNumber
 from sensorgen.workflows.templates import new
 

@@ -10,10 +10,9 @@ from sensorgen.core.display import Displayed
 from sensorgen.core.document import Cell, Column, Part, Table, comma_separated, shown
 from sensorgen.core.findings import Verdict
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
-from sensorgen.workflows.optimise.front import Front, value_of
+from sensorgen.workflows.optimise.front import RULE, Front, tied, value_of
+from sensorgen.workflows.optimise.front import worth as worth_of
 from sensorgen.workflows.optimise.target import NUMBERS, OURS, Target
-from sensorgen.workflows.optimise.ties import RULE, tied
-from sensorgen.workflows.optimise.ties import worth as worth_of
 from sensorgen.workflows.search import Candidate
 
 _LISTED = 8  # designs, of those that are tied
