@@ -21,7 +21,7 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import Query
 from sensorgen.workflows.optimise import front, ladder, recommend, result
-from sensorgen.workflows.optimise.front import Front, search, settled
+from sensorgen.workflows.optimise.front import Front, Reason, search, settled
 from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended
 from sensorgen.workflows.optimise.sample import _objectives, sample
 from sensorgen.workflows.optimise.space import MOST, candidates, space
@@ -114,7 +114,9 @@ def test_sensitivity_on_the_coarse_mesh_is_that_of_a_bonded_plate():
 def test_limits_are_proven_before_anything_is_evaluated():
     search_ = found(limits={"capacitance_pf": {"most": 150}})
     assert {row.values["dielectric_mm"] for row in search_.evaluated} <= {0.3, 0.4}
-    assert [r for r in search_.reasons() if r[0] == "limit capacitance_pf"] == [("limit capacitance_pf", True, 6)]
+    assert [r for r in search_.reasons() if r.why == "limit capacitance_pf"] == [
+        Reason("limit capacitance_pf", True, 6)
+    ]
 
 
 def test_a_target_that_nothing_meets_names_the_nearest_and_what_binds():
@@ -229,10 +231,10 @@ def test_a_length_in_the_plane_is_varied_in_half_lines():
 
 def test_a_design_that_cannot_be_made_has_its_reason():
     search_ = found(parameters={"dielectric_mm": {"from": -0.2, "to": 0.2}})
-    (why,) = [r for r in search_.reasons() if r[0].startswith("cannot be made")]
-    assert why[1:] == (True, 2)
-    assert "dielectric_mm" in why[0]
-    assert "-0.2" in why[0]
+    (why,) = [r for r in search_.reasons() if r.why.startswith("cannot be made")]
+    assert (why.certified, why.count) == (True, 2)
+    assert "dielectric_mm" in why.why
+    assert "-0.2" in why.why
 
 
 def test_an_accepted_doubt_that_nothing_has_is_named():

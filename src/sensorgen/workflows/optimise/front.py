@@ -7,9 +7,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import inf, log
-from typing import Any
+from typing import Annotated, Any
 
 from sensorgen.core.bounds import Bounds, Interval
+from sensorgen.core.document import Column
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.parallel import Lane, open_lanes, remembered, said
 from sensorgen.workflows.optimise import ladder
@@ -56,6 +57,24 @@ class Workers:
 
 
 HERE = Workers()
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why designs are out: whether that is proven, and how many."""
+
+    why: str
+    certified: bool
+    count: int
+
+
+@dataclass(frozen=True)
+class Binding:
+    """A constraint: how many designs violate it, and how many violate nothing else."""
+
+    constraint: Annotated[str, Column("constraint")]
+    violated: Annotated[int, Column("violated by")]
+    alone: Annotated[int, Column("by it alone")]
 
 
 class Front(Search):
@@ -226,8 +245,8 @@ class Front(Search):
         """Designs that were evaluated."""
         return tuple(row for row in self.rows if row.trial)
 
-    def reasons(self) -> list[tuple[str, bool, int]]:
-        """Why designs are out, whether that is proven, and how many; of reasons that differ in numbers the first."""
+    def reasons(self) -> list[Reason]:
+        """Most frequent first; of reasons that differ in numbers alone the first."""
         found: Counter[tuple[str, bool]] = Counter()
         words: dict[str, str] = {}
         front = {row.number for row in self.front}
@@ -239,7 +258,7 @@ class Front(Search):
                 alike = _NUMBER.sub("#", why)
                 words.setdefault(alike, why)
                 found[alike, row.certified and bool(row.discarded)] += 1
-        return [(words[alike], certified, count) for (alike, certified), count in found.most_common()]
+        return [Reason(words[alike], certified, count) for (alike, certified), count in found.most_common()]
 
     def nearest(self) -> Candidate | None:
         """Where nothing meets the target: the design that violates the fewest constraints, and these the least."""
@@ -248,15 +267,14 @@ class Front(Search):
             tried, key=lambda row: (row.trial is None, len(row.violated), sum(row.violated.values())), default=None
         )
 
-    def binding(self) -> list[tuple[str, int, int]]:
-        """Constraints, how many designs violate each, and how many violate nothing else."""
+    def binding(self) -> list[Binding]:
+        """Those first that most designs violate alone."""
         every, alone = Counter[str](), Counter[str]()
         for row in self.rows:
             every.update(list(row.violated))
             alone.update(list(row.violated) if len(row.violated) == 1 else ())
-        return [
-            (name, count, alone[name]) for name, count in sorted(every.items(), key=lambda i: (-alone[i[0]], -i[1]))
-        ]
+        rows = (Binding(name, count, alone[name]) for name, count in every.items())
+        return sorted(rows, key=lambda row: (-row.alone, -row.violated))
 
 
 def search(
