@@ -196,7 +196,6 @@ def _csv(names: tuple[str, ...], beside: "Sequence[Real]", tones_hz: "Real", z: 
 def _drawn(processed: "Processed", name: str, folder: Path) -> list[str]:
     """Pictures, and the page; surfaces only where presses span one."""
     from sensorgen.analysis.plots import recordings, static
-    from sensorgen.core import files as store
 
     if processed.pairs is None:
         raise BadInput(f"--plot {folder}: {processed.notes[-1]}")
@@ -215,9 +214,7 @@ def _drawn(processed: "Processed", name: str, folder: Path) -> list[str]:
     files = {f"{figure.key}.png": static.png(figure) for figure in figures}
     if processed.by_force:
         files["run.html"] = recordings.html(run).encode()
-    for file, content in files.items():
-        store.replace(folder / file, content)
-    return [str(folder / file) for file in files]
+    return render.written(folder, files.items())
 
 
 _LAW = "smooth"

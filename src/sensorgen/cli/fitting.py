@@ -307,10 +307,8 @@ def _write(compared: "Report", path: Path, how: str) -> None:
 
 def _draw(compared: "Report", folder: Path) -> None:
     from sensorgen.analysis.plots.static import files
-    from sensorgen.core import files as store
 
     with render.progress([figure.key for figure in compared.figures]) as step:
         for figure in compared.figures:
             step(figure.key)
-            for name, content in files(figure):
-                store.replace(folder / name, content)
+            render.written(folder, files(figure))

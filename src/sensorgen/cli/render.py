@@ -225,6 +225,17 @@ def file(path: Path, content: bytes | str, note: str = "") -> None:
     say(f"{note}{path}", err=bool(form()))
 
 
+def written(folder: Path, contents: "Iterable[tuple[str, bytes]]") -> list[str]:
+    """Write files into a folder; where each is."""
+    from sensorgen.core import files
+
+    names = []
+    for name, content in contents:
+        files.replace(folder / name, content)
+        names.append(str(folder / name))
+    return names
+
+
 def columns(names: Sequence[str], rows: "Iterable[Sequence[Cell]]") -> str:
     """CSV of rows below the names of their columns, all digits; empty where nothing is known."""
     from sensorgen.core.document import Column, Table, comma_separated
