@@ -1,10 +1,10 @@
 """Figures as data with units: ``static`` draws them as PNG and SVG, ``interactive`` as data for Plotly's script."""
 
 import importlib.util
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -197,6 +197,15 @@ class Figure:
     columns: int = 1
     beside: bool = False
     stretch: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+    @classmethod
+    def by_frequency(
+        cls, key: str, title: str, alt: str, frequency_hz: Iterable[float],
+        panels: Callable[[int, str], Iterable[Panel]], columns: int,
+    ) -> Self:  # fmt: skip
+        """A figure to choose a frequency in, whose panels are made from its number and its name."""
+        choices = {at: tuple(panels(k, at)) for k, at in enumerate(map(frequency, frequency_hz))}
+        return cls(key, title, alt, choices, "frequency", columns)
 
 
 def look(k: int) -> dict[str, str]:
