@@ -97,6 +97,14 @@ def _sources(comparison: Comparison) -> list[Origin]:
 STEPS = ("readings", "recordings", "residuals", "variants", "page")
 
 
+@dataclass(frozen=True)
+class LeftOut:
+    """Something that could not be used, and the reason."""
+
+    what: Annotated[str, Column("what")]
+    why: Annotated[str, Column("why")]
+
+
 @dataclass(frozen=True, eq=False)
 class Report:
     """A report.
@@ -258,7 +266,7 @@ def _sections(
     )
     if left_out:
         caption = "What was left out, or taken with care, and why"
-        parts = (Table("left_out", caption, (Column("what"), Column("why")), left_out),)
+        parts = (Table.of("left_out", caption, tuple(LeftOut(*row) for row in left_out)),)
         yield PageSection("left-out", "What was left out, and why", parts=parts)
     yield PageSection("provenance", "Provenance", parts=(origins(log, comparison, brief=alone),))
 
