@@ -273,6 +273,27 @@ def planted(plate, numbers, objectives):
     return search_
 
 
+def test_reasons_and_constraints_are_counted():
+    """Reasons that differ in numbers are one; what an evaluation shows is not proven; who violates most alone, first."""
+    search_ = planted((None, None), (), FORCE)
+    search_.rows = [
+        Candidate({}, number=1, violated={"limit a": 1.0, "limit b": 1.0}),
+        Candidate({}, number=2, violated={"limit a": 1.0}),
+        *(
+            Candidate({}, number=k, discarded=f"violates doubt {k}.5", certified=False, violated={"doubt": 1.0})
+            for k in (3, 4, 5)
+        ),
+        Candidate({}, number=6, discarded="limit c", violated={"limit c": 1.0}),
+    ]
+    assert search_.reasons() == [
+        Reason("violates doubt 3.5", False, 3), Reason("violates limit a", False, 2), Reason("limit c", True, 1),
+    ]  # fmt: skip
+    assert [vars(row) for row in search_.binding()] == [
+        {"constraint": "doubt", "violated": 3, "alone": 3}, {"constraint": "limit a", "violated": 2, "alone": 1},
+        {"constraint": "limit c", "violated": 1, "alone": 1}, {"constraint": "limit b", "violated": 1, "alone": 0},
+    ]  # fmt: skip
+
+
 FORCE = {"force_resolution_n": "minimise"}
 BOTH = FORCE | {"position_resolution_mm": "minimise"}
 
