@@ -274,7 +274,7 @@ def planted(plate, numbers, objectives):
 
 
 def test_reasons_and_constraints_are_counted():
-    """Reasons that differ in numbers are one; what an evaluation shows is not proven; who violates most alone, first."""
+    """Reasons that differ in numbers are one; an evaluation proves nothing; who violates most alone comes first."""
     search_ = planted((None, None), (), FORCE)
     search_.rows = [
         Candidate({}, number=1, violated={"limit a": 1.0, "limit b": 1.0}),
