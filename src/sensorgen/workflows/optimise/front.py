@@ -23,7 +23,7 @@ MARGIN = 1.5  # between a number on the coarse mesh and its best value; widened 
 _SURE, _POWER, _WIDER = 3, 5, 1.1  # evaluated designs from which on it is a power of the largest seen, or wider by 1.1
 FEW = 8  # designs that are evaluated without a coarse mesh [-]
 _CHECKS, _BOUNDS, _EVALUATION = range(3)
-RULE = "fewest warnings, then most layers between the electrodes, then best value"
+RULE = "the other objectives, then fewest warnings, then most layers between the electrodes, then best value"
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 
 Progress = Callable[[str, int, int], None]  # step, how many are done, how many there are
@@ -355,7 +355,7 @@ def settled(found: Front, best: Candidate, key: str = "") -> tuple[Candidate, tu
     Returns
     -------
     tuple
-        The design that :data:`RULE` chooses, and the others.
+        The design that :data:`RULE` chooses, and the others; ``best`` among them where another one is as good.
     """
     target = found.target
     keys = [key, *(k for k in target.objectives if k != key)] if key else list(target.objectives)
@@ -364,7 +364,7 @@ def settled(found: Front, best: Candidate, key: str = "") -> tuple[Candidate, tu
         ahead = min(group, key=partial(worth, target, each))
         group = [row for row in group if row is ahead or tied(ahead, row, [each])]
     chosen = min(group, key=lambda row: (*_rule(row), worth(target, keys[0], row), row.number))
-    return chosen, tuple(row for row in group if row is not chosen)
+    return chosen, tuple(row for row in dict.fromkeys((*group, best)) if row is not chosen)
 
 
 def worth(target: Target, key: str, row: Candidate) -> float:

@@ -45,6 +45,8 @@ class Chosen:
         Leading designs that equal it in every objective, within what the models leave open; of others than these.
     uninformed : dict of str to float
         Of numbers that are errors: the error without any reading, of a uniform distribution.
+    body : str
+        How it is printed: by an estimate or a slicer, which verdict and numbers are of; "" where it was not evaluated.
     """
 
     number: int
@@ -58,6 +60,7 @@ class Chosen:
     leads: bool = False
     tied: tuple[int, ...] = ()
     uninformed: dict[str, float] = field(default_factory=dict)
+    body: str = ""
 
     def senses(self, name: str) -> bool:
         """False for an error that is that of no reading."""
@@ -200,12 +203,11 @@ class Optimised(Displayed):
              *(c.cell(n) for n in names), c.verdict)
             for c in self.front
         )  # fmt: skip
-        return Table(
-            "front",
-            "Front, as printed: > no best values are better, = as good within ranges, others: perhaps, by their range",
-            columns,
-            tuple(cells),
+        bodies = "; ".join(dict.fromkeys(c.body for c in self.front))
+        caption = (
+            f"Front, {bodies}: > no best values are better, = as good within ranges, others: perhaps, by their range"
         )
+        return Table("front", caption, columns, tuple(cells))
 
     def _keys(self) -> list[str]:
         """Parameters that are varied."""
@@ -269,7 +271,8 @@ def _designs(some: Sequence[Recommended]) -> Iterator[Part]:
     """Each design to print: role, verdict, folder, ties and numbers."""
     for one in some:
         yield ""
-        files = ", ".join(filter(None, (one.verdict, one.folder)))
+        by = f"{one.verdict}; sliced by {one.slicer}" if one.sliced is not None else one.verdict
+        files = ", ".join(filter(None, (by, one.folder)))
         yield f"design {one.design.number}, {one.role}" + (f": {files}" if files else "")
         if one.ties:
             others = ", ".join(map(str, one.ties[:_LISTED])) + ", ..." * (len(one.ties) > _LISTED)
@@ -347,7 +350,7 @@ def chosen(target: Target, row: Candidate, *, leads: bool = False, ties: tuple[i
     return Chosen(
         row.number, dict(row.values), design.name if design else "", design.id() if design else "",
         row.discarded, tuple(row.violated), trial.verdict if trial else "",
-        {key: value for key, value in values.items() if value}, leads, ties, uninformed,
+        {key: value for key, value in values.items() if value}, leads, ties, uninformed, trial.body if trial else "",
     )  # fmt: skip
 
 
