@@ -90,16 +90,21 @@ def listed() -> dict[str, str]:
     """Every kind with its role, those of PyMeasure included, or how to get them."""
     from sensorgen.measure.lab import pymeasure_meters
 
-    roles = dict[str, str]()
+    try:
+        return roles() | {name: role for name, (role, _) in pymeasure_meters.roles().items()}
+    except NotInstalled as error:
+        return roles() | {f"{PYMEASURE}CLASS": str(error)}
+
+
+def roles() -> dict[str, str]:
+    """Every kind with its role, or why it cannot be used, without those of PyMeasure."""
+    by_name = dict[str, str]()
     for name in names():
         try:
-            roles[name] = kind(name).role
+            by_name[name] = kind(name).role
         except BadInput as error:
-            roles[name] = f"cannot be used: {error}"
-    try:
-        return roles | {name: role for name, (role, _) in pymeasure_meters.roles().items()}
-    except NotInstalled as error:
-        return roles | {f"{PYMEASURE}CLASS": str(error)}
+            by_name[name] = f"cannot be used: {error}"
+    return by_name
 
 
 def kind(name: str) -> Kind:
@@ -240,7 +245,7 @@ def _handyscope() -> Kind:
     from sensorgen.measure.virtual.handyscope import Analyser, PhasorMeter
 
     def simulate(plant: Plant, given: HandyscopeSettings, clock: Clock) -> Simulated:
-        far_end = PhasorMeter(plant, clock, Analyser(given.feedback_ohm, given.feedback_f), range_v=given.range_v)
+        far_end = PhasorMeter(plant, clock, Analyser(given.feedback_ohm, given.feedback_f, given.range_v))
         return Simulated(far_end, far_end)
 
     def real(address: str, given: HandyscopeSettings, clock: Clock) -> Device:

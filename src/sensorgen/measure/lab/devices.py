@@ -104,6 +104,10 @@ class Identity:
     serial: str = ""
     firmware: str = ""
 
+    def words(self) -> str:
+        """All that is known, for people."""
+        return " ".join(filter(None, (self.model, self.serial, self.firmware)))
+
 
 @dataclass(frozen=True)
 class Extension:

@@ -85,17 +85,13 @@ class RunResult:
         """Outcome, recordings and problems."""
         yield f"{self.specimen}: {self.done} of {self.steps} presses{', simulated' if self.simulated else ''}"
         facts = [("end", f"{self.end}: {self.reason}"), ("tip", "up" if self.tip_up else "NOT KNOWN TO BE UP")]
-        facts += [("device", f"{role}: {_named(who)}") for role, who in self.identities.items()]
+        facts += [("device", f"{role}: {who.words()}") for role, who in self.identities.items()]
         facts += [("readings", ", ".join(f"{count} {name}" for name, count in self.counts.items()))]
         facts += [("log", f"recording {row.number}") for row in self.rows] or [("log", "no new recording")]
         facts += [("problem", problem) for problem in self.problems]
         yield Facts((*facts, ("run", self.folder)))
         if self.done < self.steps:
             yield f"go on: sensorgen bench run --resume {Path(self.folder).name}"
-
-
-def _named(who: Identity) -> str:
-    return " ".join(filter(None, (who.model, who.serial, who.firmware)))
 
 
 @dataclass(frozen=True)
@@ -141,7 +137,8 @@ def planned(experiment: Experiment, log: "Log | None" = None) -> PlannedRun:
     """
     with within("specimen"):
         notes.specimen(experiment.specimen, log)
-    length = experiment.length_mm or _length_mm(design_of(experiment, log))
+    design = None if experiment.length_mm else design_of(experiment, log)
+    length = experiment.length_mm or (float(design.params.length_mm) if design else USUAL_MM)
     experiments.check(experiment, length, 0.0)  # its places, before presses are made of them
     steps = experiments.steps(experiment, length)
     holds = [part.content.hold_s[1] for part in experiment.plan if isinstance(part.content, Next)]
@@ -164,10 +161,6 @@ def design_of(experiment: Experiment, log: "Log | None") -> Design | None:
         return logged or notes.design_of(experiment.specimen)
     except BadInput:
         return None
-
-
-def _length_mm(design: Design | None) -> float:
-    return float(design.params.length_mm) if design else USUAL_MM
 
 
 def run(
@@ -380,9 +373,8 @@ class _Attempt:
                   "late periods": loop.late}  # fmt: skip
         failed = list(problems)
         try:
-            recording.state(
-                0.0, loop.wanted_mm if isfinite(loop.wanted_mm) else 0.0, float("nan"), _error_of(end, reason)
-            )
+            place_mm = loop.wanted_mm if isfinite(loop.wanted_mm) else 0.0
+            recording.state(0.0, place_mm, float("nan"), reason if end == "fault" else "")
             recording.journal.note("ended", attempt=self.number, end=end, reason=reason, tip_up=up, problems=problems,
                               counts=counts)  # fmt: skip
         except SensorgenError as error:
@@ -401,10 +393,6 @@ class _Attempt:
             self.plan.experiment.specimen, str(self.folder), end, reason, len(self.done), len(self.plan.steps),
             self.simulated, up, tuple(rows), tuple(failed), self.identities, counts,
         )  # fmt: skip
-
-
-def _error_of(end: str, reason: str) -> str:
-    return reason if end == "fault" else ""
 
 
 def _beside(loop: Loop, choose: Callable[[], Choice]) -> Choice:
