@@ -8,7 +8,7 @@ import csv
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput
@@ -120,7 +120,8 @@ def read(path: Path) -> LcrTable:
         if any(cells[k].strip("+0. ") for k in header.status):
             faulty += 1
         else:
-            rows.append(_values(cells, columns, path, number))
+            values = ((column, _value(cells[column.at], column, path, number)) for column in columns)
+            rows.append({column: value for column, value in values if value})
     overloads = len(rows) * len(columns) - sum(map(len, rows))
     readings = tuple(_readings(rows, columns, path))
     if not readings:
@@ -250,20 +251,9 @@ def _with_units(lines: Sequence[str], header: _Header) -> tuple[tuple[_Column, .
     cells = _cells(lines[below], header.separator) if below < len(lines) else []
     if not any(cells) or any(_NUMBER.match(cell) for cell in cells) or len(cells) > len(header.heads):
         return header.columns, below
-    return tuple(_with_unit(column, cells) for column in header.columns), below + 1
-
-
-def _with_unit(column: _Column, cells: Sequence[str]) -> _Column:
-    """A column in the unit that its cell of the row of units states, if it does."""
-    unit = cells[column.at].strip("[]() -") if column.at < len(cells) else ""
-    scale = float(immittance.factor(column.quantity, unit)) if unit else column.scale
-    return _Column(column.at, column.quantity, scale, column.head)
-
-
-def _values(cells: Sequence[str], columns: Sequence[_Column], path: Path, number: int) -> _Row:
-    """Numbers of a row, without those that are missing."""
-    values = ((column, _value(cells[column.at], column, path, number)) for column in columns)
-    return {column: value for column, value in values if value}
+    units = {c: cells[c.at].strip("[]() -") if c.at < len(cells) else "" for c in header.columns}
+    scales = {c: float(immittance.factor(c.quantity, unit)) if unit else c.scale for c, unit in units.items()}
+    return tuple(replace(column, scale=scale) for column, scale in scales.items()), below + 1
 
 
 def _value(cell: str, column: _Column, path: Path, number: int) -> tuple[float, bool] | None:

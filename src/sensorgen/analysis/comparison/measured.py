@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from sensorgen.analysis.plots.figure import thinned_together
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.lazy import Lazy
 from sensorgen.measure.log import BenchRun, Log, Reading
 from sensorgen.measure.log.bench import read_again
 from sensorgen.measure.recording import Joined, Recording, RigLog, Source, joined_all
-from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.measure.signal import presses
 from sensorgen.measure.signal.run import processed
 

@@ -7,14 +7,13 @@ import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
+from sensorgen.measure.csv_table import SAME_NAMES
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import files
 from sensorgen.measure.log.entries import BenchRun, Entry
@@ -130,7 +129,9 @@ _CLOCK = ("offset_s", "offset_error_s", "skew", "skew_error", "explained")
 
 def to_json(facts: RecordingFacts) -> str:
     """Facts as JSON."""
-    return str(_adapter().dump_json(facts, exclude_none=facts.rig is None).decode())
+    from sensorgen.core.records import adapter
+
+    return adapter(RecordingFacts).dump_json(facts, exclude_none=facts.rig is None).decode()
 
 
 def from_json(text: str) -> RecordingFacts:
@@ -143,10 +144,10 @@ def from_json(text: str) -> RecordingFacts:
     """
     from pydantic import ValidationError
 
-    from sensorgen.core.records import problem
+    from sensorgen.core.records import adapter, problem
 
     try:
-        facts: RecordingFacts = _adapter().validate_json(text)
+        facts: RecordingFacts = adapter(RecordingFacts).validate_json(text)
     except ValidationError as error:
         raise BadInput(f"the facts of a recording are damaged: {problem(error, _plain(text))}") from None
     return facts
@@ -157,13 +158,6 @@ def _plain(text: str) -> Any:
         return json.loads(text)
     except ValueError:
         return text
-
-
-@cache
-def _adapter() -> Any:
-    from pydantic import TypeAdapter
-
-    return TypeAdapter(RecordingFacts)
 
 
 def summarised(
@@ -220,17 +214,14 @@ def _known(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-_SAME_NAMES: Mapping[str, str] = MappingProxyType({})
-
-
 def log_recording(
     log: Log,
     specimen: str,
     recording: Path,
     rig: Path | None = None,
     *,
-    columns: Mapping[str, str] = _SAME_NAMES,
-    rig_columns: Mapping[str, str] = _SAME_NAMES,
+    columns: Mapping[str, str] = SAME_NAMES,
+    rig_columns: Mapping[str, str] = SAME_NAMES,
     remark: str = "",
     supersedes: str = "",
 ) -> list[Entry]:

@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.recording.rig import Offset, RigLog, estimated
-from sensorgen.measure.recording.samples import Real, Recording
+from sensorgen.measure.recording.samples import Recording
 
 _SILENT = 5.0  # median row distances beyond which the rig's log has a gap
 _STAMPED_S = 1.0  # by which stamps of one computer differ at most: blocks that wait, instruments that take their time

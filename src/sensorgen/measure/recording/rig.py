@@ -18,11 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
+from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.measure import csv_table
 from sensorgen.measure.csv_table import SAME_NAMES, CsvTable, listed
 from sensorgen.measure.input_file import checked_head
-from sensorgen.measure.recording.samples import MAX_SKEW, Bools, Complex, Real, Recording
+from sensorgen.measure.recording.samples import MAX_SKEW, Recording
 from sensorgen.measure.recording.spool import MOST_BYTES
 
 _TIME, _STAMP = "time_s", "stamp_s"
@@ -56,7 +57,7 @@ class RigLog:
     set_force_n: Real
     set_position_mm: Real
     force_n: Real
-    error: Bools
+    error: Mask
     notes: tuple[str, ...] = ()
     stamped: bool = False
 

@@ -12,20 +12,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.errors import BadInput, within
-from sensorgen.measure.recording import samples
 from sensorgen.measure.recording.matfive import Split
-from sensorgen.measure.recording.samples import (
-    MOST_TONES,
-    Bools,
-    Real,
-    Recording,
-    Source,
-    blank,
-    rate_hz,
-    sifted,
-    stretches,
-)
+from sensorgen.measure.recording.samples import MOST_TONES, Recording, Source, stretches
 
 WANTED = ("impedance_data", "impedance_time", "timestamps", "settings", "ref_offset", "sig_offset", "offset_time")
 _MARGIN = 0.99  # of a range, as in the program itself
@@ -173,7 +163,7 @@ class _LockIn:
     count: int
     incomplete: int
     settings: Tree
-    clipping: Callable[[Real], Bools]
+    clipping: Callable[[Real], Mask]
 
     @classmethod
     def of(
@@ -203,19 +193,15 @@ class _LockIn:
         z = np.zeros((at.stop - at.start, len(self.tones_hz)), np.complex128)
         for half, part in zip((z.real, z.imag), self.parts, strict=False):
             half[:] = part[at]
-        with within(f"impedance_time of {self.name}"):
-            rebuilt = samples.rebuilt(len(z), time, stamps)
-        rate, bandwidth = rate_hz(rebuilt.time_s), _number(self.settings, "bandwidth")
-        marks = blank(len(z)) | rebuilt.marks | sifted(z) | {"clipped": self.clipping(np.asarray(time))}
-        if at.start == 0 and bandwidth > 0 and np.isfinite(rate):  # until the demodulator's filter has settled
-            marks["transient"][: ceil(min(_START_UP / bandwidth * rate, len(z)))] = True
-        version = self.settings.get("version")
+        version, bandwidth = self.settings.get("version"), _number(self.settings, "bandwidth")
         program = f"TiePieLCR {version[:40].strip()}" if isinstance(version, str) else "TiePieLCR"
-        source = replace(
-            source, lockin=int(self.name[6:]), program=program, bandwidth_hz=bandwidth, rate_hz=rate,
-            notes=notes + rebuilt.notes,
-        )  # fmt: skip
-        return Recording(rebuilt.time_s, self.tones_hz, z, marks, rebuilt.clock, source)
+        source = replace(source, lockin=int(self.name[6:]), program=program, bandwidth_hz=bandwidth, notes=notes)
+        with within(f"impedance_time of {self.name}"):
+            one = Recording.rebuilt(z, self.tones_hz, time, stamps, source, clipped=self.clipping(np.asarray(time)))
+        rate = one.source.rate_hz
+        if at.start == 0 and bandwidth > 0 and np.isfinite(rate):  # until the demodulator's filter has settled
+            one.marks["transient"][: ceil(min(_START_UP / bandwidth * rate, len(z)))] = True
+        return one
 
 
 def _matrix(raw: Any, name: str, tones: int) -> tuple[Vector, ...]:
@@ -233,7 +219,7 @@ def _matrix(raw: Any, name: str, tones: int) -> tuple[Vector, ...]:
     return tuple(part.reshape(shape) for part in ((raw.real, raw.imag) if raw.dtype.kind == "c" else (raw.real,)))
 
 
-def _clipping(tree: Tree, k: int, count: int, settings: Tree) -> Callable[[Real], Bools]:
+def _clipping(tree: Tree, k: int, count: int, settings: Tree) -> Callable[[Real], Mask]:
     """Times at which the mean of an input fills the input's range.
 
     The program detects clipping in its waveforms and displays it, but the file has only the means of the two inputs: a
@@ -255,7 +241,7 @@ def _clipping(tree: Tree, k: int, count: int, settings: Tree) -> Callable[[Real]
     curves = [(_largest(mean, each)[order], limit) for mean, limit in zip(means, limits, strict=True)
               if len(mean) == len(at) > 0]  # fmt: skip
 
-    def clipped(time_s: Real) -> Bools:
+    def clipped(time_s: Real) -> Mask:
         over = [np.interp(time_s, times[order], mean) >= _MARGIN * limit for mean, limit in curves]
         return np.asarray(np.any([np.zeros(len(time_s), bool), *over], axis=0))
 

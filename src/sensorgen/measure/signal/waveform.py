@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.core.arrays import Real
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 
 TONES_HZ = (1100.0, 2300.0, 5300.0, 10100.0, 19900.0, 49900.0, 99700.0)  # thesis, Table 5.1; it prints 4990 for 49900
@@ -77,7 +77,6 @@ def multisine(tones_hz: Real, rate_hz: float, count: int) -> Multisine:
     return Multisine(samples / peak, weights / peak)
 
 
-Complex = NDArray[np.complex128]
 _BATCH = 1 << 16  # samples that fit into the cache
 _SEGMENT = 256  # least samples of a segment: large enough for the matrix product, small enough for the sum
 
