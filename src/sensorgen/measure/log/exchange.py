@@ -47,20 +47,16 @@ _LATER_COLUMNS: dict[type[Entry], tuple[str, ...]] = {  # that exports of earlie
     Reading: ("quantity", "value", "frequency_hz", "uncertainty", "wires", "temperature_c", "humidity_percent",
               "photo", "file", "defects"),
 }  # fmt: skip
-_COLUMNS = {kind: {k: v for k, v in entries.columns(kind).items() if k != "number"} for kind in ROWS}
-
-
-def columns(kind: type[Entry]) -> dict[str, Any]:
-    """Columns of an exported table with their types: all fields but the row's number in its own log."""
-    return _COLUMNS[kind]
+COLUMNS = {kind: {k: v for k, v in entries.columns(kind).items() if k != "number"} for kind in ROWS}
+"""Columns of each exported table with their types: all fields but the row's number in its own log."""
 
 
 def kind_of(names: Iterable[str]) -> type[Entry] | None:
     """Kind of row with exactly these columns, or None; those of later versions may be missing."""
     present = {*names, "claimed_at"}
     for kind in ROWS:
-        needed = columns(kind).keys() - _LATER_COLUMNS.get(kind, ())
-        if needed <= present <= columns(kind).keys():
+        needed = COLUMNS[kind].keys() - _LATER_COLUMNS.get(kind, ())
+        if needed <= present <= COLUMNS[kind].keys():
             return kind
     return None
 
@@ -125,7 +121,7 @@ def _write_table(log: Log, kind: type[Entry], path: Path, file_format: str) -> i
 
 def csv_lines(kind: type[Entry], rows: Iterable[Entry]) -> Iterator[str]:
     """Rows as CSV, the header first."""
-    wanted, target = columns(kind), io.StringIO(newline="")
+    wanted, target = COLUMNS[kind], io.StringIO(newline="")
     writer = csv.writer(target, lineterminator="\r\n")  # \n alone leaves a bare \r unquoted
     writer.writerow(wanted)
     yield target.getvalue()
@@ -164,7 +160,7 @@ def from_csv(kind: type[Entry], table: CsvTable) -> Iterator[Entry]:
 def _entry(
     kind: type[Entry], values: Mapping[str, Any], where: str, convert: Callable[[Any, Any], Value]
 ) -> Entry:  # fmt: skip
-    wanted, row = columns(kind), dict[str, Any]()
+    wanted, row = COLUMNS[kind], dict[str, Any]()
     for name, value in values.items():
         try:
             row[name] = convert(wanted[name], value)
@@ -189,7 +185,7 @@ def parquet(kind: type[Entry], rows: list[Entry]) -> bytes:
     }  # fmt: skip
     arrays = {
         name: pyarrow.array([getattr(row, name) for row in rows], types[annotation])
-        for name, annotation in columns(kind).items()
+        for name, annotation in COLUMNS[kind].items()
     }
     sink = io.BytesIO()
     pyarrow.parquet.write_table(pyarrow.table(arrays), sink)
