@@ -120,7 +120,10 @@ def kind(name: str) -> Kind:
     if name in _KINDS:
         return _KINDS[name]()
     if name.startswith(PYMEASURE):
-        return _pymeasure(name)
+        from sensorgen.measure.lab import pymeasure_meters
+
+        role, driver = pymeasure_meters.meter(name)
+        return Kind(role, pymeasure_meters.Settings, driver)
     point = _installed().get(name)
     if point is None:
         raise UnknownName("kind of device", name, names())
@@ -283,13 +286,6 @@ def _frames() -> Kind:
         return frame_stream.FrameStream(port.SerialPort(address, given.baud), clock)
 
     return Kind("array", frame_stream.StreamSettings, real)
-
-
-def _pymeasure(name: str) -> Kind:
-    from sensorgen.measure.lab import pymeasure_meters
-
-    role, driver = pymeasure_meters.meter(name)
-    return Kind(role, pymeasure_meters.Settings, driver)
 
 
 _KINDS: dict[str, Callable[[], Kind]] = {

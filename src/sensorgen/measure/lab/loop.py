@@ -159,7 +159,9 @@ class Loop:
         self.beat()
         if "actuator" in self.rig.started:
             self.extension = self.rig.actuator.read()
-            self._check_actuator()
+            if wrong := self._wrong():  # is lifted at once, in the same period
+                self.rig.actuator.lift()
+                raise DeviceFault(f"{wrong}: lifted")
             if isfinite(self.set_n):
                 self.rig.actuator.push(self.set_n)
         if "stage" in self.rig.started and self.count % _STAGE == 0:
@@ -203,12 +205,6 @@ class Loop:
             raise DeviceFault(f"run: stood still for {now - self._last_s:.2f} s, longer than limits.dead_man_s")
         self.late += now - due > PERIOD_S
         self._last_s = due if now - due < PERIOD_S else now
-
-    def _check_actuator(self) -> None:
-        """Lift at once, in the same period, what leaves the limits."""
-        if wrong := self._wrong():
-            self.rig.actuator.lift()
-            raise DeviceFault(f"{wrong}: lifted")
 
     def _wrong(self) -> str:
         """Fault of the actuator's reading, or ""."""

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
-from sensorgen.measure.csv_table import SAME_NAMES
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import files
 from sensorgen.measure.log.entries import BenchRun, Entry
@@ -220,8 +219,8 @@ def log_recording(
     recording: Path,
     rig: Path | None = None,
     *,
-    columns: Mapping[str, str] = SAME_NAMES,
-    rig_columns: Mapping[str, str] = SAME_NAMES,
+    columns: Mapping[str, str] | None = None,
+    rig_columns: Mapping[str, str] | None = None,
     remark: str = "",
     supersedes: str = "",
 ) -> list[Entry]:
@@ -262,7 +261,7 @@ def log_recording(
         checked_head(path, MOST_BYTES, "a recording")
     before = [files.raw_file(path) for path in paths]
     rig_log = recordings.rig(rig, rig_columns) if rig else None
-    summary = summarised(recordings.parts(recording, columns), dict(columns), rig_log, dict(rig_columns))
+    summary = summarised(recordings.parts(recording, columns), dict(columns or {}), rig_log, dict(rig_columns or {}))
     raw_files = [files.keep(log.files, path) for path in paths]
     if raw_files != before:
         raise BadInput(f"{str(recording)!r} {files.CHANGED}")

@@ -23,9 +23,9 @@ from typing import Any
 
 from sensorgen.core.errors import BadInput, SensorgenError, Unwritable
 from sensorgen.core.files import part_of, remove_stale_parts, sync_folder
-from sensorgen.measure.log import chain
+from sensorgen.measure.log import chain, entries
 from sensorgen.measure.log.chain import Record
-from sensorgen.measure.log.entries import INDEXED, KINDS, Migration, columns, encode, indexed
+from sensorgen.measure.log.entries import Entry, Migration
 
 APPLICATION_ID = 0x53474C47  # in the header of the file: "SGLG"
 
@@ -51,7 +51,7 @@ STEPS = (  # migrations from each version to the next
     _step("version3.sql", "record"),
 )
 VERSION = len(STEPS)
-_COLUMNS = ("sequence", "id", "parents", "kind", "version", "logged_at", "content", "number", *INDEXED)
+_COLUMNS = ("sequence", "id", "parents", "kind", "version", "logged_at", "content", "number", *entries.INDEXED)
 _INSERT = f"INSERT INTO record ({', '.join(_COLUMNS)}) VALUES ({', '.join('?' * len(_COLUMNS))})"  # noqa: S608
 
 
@@ -71,12 +71,16 @@ class Appender:
         self.sequence, self.head = sequence, head
         self._numbers: dict[str, int] = {}
 
-    def add(
-        self, kind: str, version: int, logged_at: str, content: str, index: Sequence[str | int | None] | None = None
-    ) -> int:
-        """Append a new record behind the last one; its number among its kind."""
-        record = chain.made([self.head] if self.head else [], kind, version, logged_at, content)
-        return self.append(record, indexed(content) if index is None else index)
+    @property
+    def heads(self) -> list[str]:
+        """The last record, if there is one."""
+        return [self.head] if self.head else []
+
+    def add(self, entry: Entry, now: str, heads: Sequence[str] = ()) -> int:
+        """Append the record of a row, behind the last one or behind several; its number among its kind."""
+        kind, content = entries.NAMES[type(entry)], entries.content_of(entry)
+        record = chain.made(heads or self.heads, kind, entries.VERSIONS.get(kind, 1), now, entries.encoded(content))
+        return self.append(record, entries.index(content))
 
     def append(self, record: Record, index: Sequence[str | int | None], *, copy: bool = False) -> int:
         """Append a record with its entries of the index; a copy of a row that the log has gets no number of its own."""
@@ -122,9 +126,10 @@ def to_records(connection: sqlite3.Connection, version: int) -> None:
     writer = Appender(connection)
     rows = heapq.merge(*(_rows(connection, table) for table in _TABLES), key=lambda row: row[0])
     for logged_at, table, content in rows:
-        writer.add(table, 1, logged_at if _TIME.fullmatch(logged_at) else now, content)
+        at = logged_at if _TIME.fullmatch(logged_at) else now
+        writer.append(chain.made(writer.heads, table, 1, at, content), entries.indexed(content))
     if writer.sequence:
-        writer.add("migration", 1, now, encode(Migration(uid="", version=version, rows=writer.sequence)))
+        writer.add(Migration(uid="", version=version, rows=writer.sequence), now)
     writer.finish()
     for table in _DROPPED:
         connection.execute(f"DROP TABLE {table}")
@@ -132,7 +137,7 @@ def to_records(connection: sqlite3.Connection, version: int) -> None:
 
 def _rows(connection: sqlite3.Connection, table: str) -> Iterator[tuple[str, str, str]]:
     """Time, table and content of the rows of a table."""
-    joined = "NATURAL JOIN specimen" if "specimen" in columns(KINDS[table]) else ""
+    joined = "NATURAL JOIN specimen" if "specimen" in entries.columns(entries.KINDS[table]) else ""
     cursor = connection.cursor()
     cursor.row_factory = sqlite3.Row
     for row in cursor.execute(f"SELECT * FROM {table} {joined} ORDER BY number"):  # noqa: S608
@@ -140,9 +145,9 @@ def _rows(connection: sqlite3.Connection, table: str) -> Iterator[tuple[str, str
 
 
 def _content(table: str, row: Any) -> str:
-    kind = KINDS[table]
+    kind = entries.KINDS[table]
     parts = []
-    for name, annotation in columns(kind).items():
+    for name, annotation in entries.columns(kind).items():
         if name not in row.keys() or name in ("number", "logged_at") or row[name] is None:  # noqa: SIM118 - sqlite3.Row
             continue
         value: object = row[name]

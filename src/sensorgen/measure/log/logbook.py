@@ -37,11 +37,7 @@ from sensorgen.measure.log.entries import (
     Value,
     Withdrawal,
     columns,
-    content_of,
     decode,
-    encode,
-    encoded,
-    index,
     indexed,
     word,
 )
@@ -377,8 +373,7 @@ class Log:
             yield merging
             if merging.added:
                 if len(merging.heads) > 1:
-                    content = encode(Merge(uid=""))
-                    writer.append(chain.made(list(merging.heads), NAMES[Merge], 1, now, content), indexed(content))
+                    writer.add(Merge(uid=""), now, list(merging.heads))
                 writer.finish()
 
     def sequence(self, key: str) -> int:
@@ -418,9 +413,7 @@ class Log:
             self._printed.clear()
         if entry.logged_at and not entry.claimed_at:
             entry = dataclasses.replace(entry, claimed_at=entry.logged_at)
-        content = content_of(entry)
-        version = VERSIONS.get(NAMES[kind], 1)
-        return entry.numbered(writer.add(NAMES[kind], version, now, encoded(content), index(content)), now)
+        return entry.numbered(writer.add(entry, now), now)
 
     def _check(self, entry: Entry) -> None:
         """Refuse a row that refers to none, corrects none, cannot be read later, or gives a name a second design."""
@@ -543,7 +536,7 @@ class Merging:
 
     def __init__(self, log: Log, writer: Appender) -> None:
         self._log, self._writer = log, writer
-        self.added, self.heads = 0, dict.fromkeys([writer.head] if writer.head else [])
+        self.added, self.heads = 0, dict.fromkeys(writer.heads)
         self.offered = bytearray(writer.sequence + 1)
 
     def take(self, record: Record) -> str:

@@ -336,7 +336,9 @@ def _refined(time: Real, signal: Real, rig: RigLog, offset: float) -> Offset:
         slope = -((responses(at + h) - responses(at - h)) / (2 * h)) @ of_force
         extended = np.hstack([model, slope[:, None], (slope * u * half)[:, None]])
         step = _least_squares(extended, residual)[-2:]
-        covariance = _covariance(extended, residual)
+        variance = float(residual @ residual) / max(len(residual) - extended.shape[1], 1)
+        variance *= len(residual) / _independent(residual)  # correlated residuals
+        covariance = np.linalg.pinv(extended.T @ extended)[-2:, -2:] * variance
         offset, skew = offset + float(np.clip(step[0], -h, h)), float(np.clip(skew + step[1], -MAX_SKEW, MAX_SKEW))
         if abs(step[0]) < 1e-3 * covariance[0, 0] ** 0.5 or abs(step[0]) < 1e-9:
             break
@@ -363,13 +365,6 @@ def _least_squares(model: Real, signal: Real) -> Real:
     size = np.where(size > 0, size, 1.0)
     scaled = model / size
     return np.asarray(np.linalg.lstsq(scaled.T @ scaled, scaled.T @ signal, rcond=1e-13)[0] / size)
-
-
-def _covariance(model: Real, residual: Real) -> Real:
-    """Covariance of the last two weights for correlated residuals."""
-    variance = float((residual**2).sum()) / max(len(residual) - model.shape[1], 1)
-    variance *= len(residual) / _independent(residual)
-    return np.asarray(np.linalg.pinv(model.T @ model)[-2:, -2:] * variance)
 
 
 def _independent(residual: Real) -> float:

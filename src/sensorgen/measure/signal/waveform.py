@@ -185,13 +185,11 @@ def _transformed(windows: NDArray[Any], bins: NDArray[np.int64]) -> Complex:
 def _factors(size: int, bins: tuple[int, ...]) -> tuple[NDArray[np.float64], Complex]:
     """Matrix of a segment: real parts, imaginary parts; phase factors of the segments."""
     segment = next(n for n in range(min(_SEGMENT, size), size + 1) if size % n == 0)
-    within, between = (_turns(at, np.array(bins), size) for at in (np.arange(segment), np.arange(0, size, segment)))
+    within, between = (  # whole turns are removed first, to keep the digits
+        np.exp(-2j * np.pi * (np.outer(at, bins) % size) / size)
+        for at in (np.arange(segment), np.arange(0, size, segment))
+    )
     return np.hstack([within.real, within.imag]), between
-
-
-def _turns(at: NDArray[np.int64], bins: NDArray[np.int64], size: int) -> Complex:
-    """Phase factors at some samples; whole turns are removed first, to keep the digits."""
-    return np.asarray(np.exp(-2j * np.pi * (np.outer(at, bins) % size) / size))
 
 
 def impedance(

@@ -4,8 +4,8 @@ Every interface of a section, level or sloping, is a line of edges of elements.
 """
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Collection, Mapping, Sequence
+from itertools import chain, pairwise
 from math import prod
 
 import numpy as np
@@ -87,9 +87,13 @@ def graded(count: int) -> Real:
 
 def _interfaces(columns_: Sequence[SectionColumn]) -> list[Real]:
     """Heights of the interfaces of all columns at their sides, the same ones from side to side [mm]."""
-    levels = _levels(columns_)
-    lines = [_lines(c, levels) for c in columns_]
-    if len({len(of) for of in lines}) > 1 or not _joined(lines):
+    ends = [{end for layer in c.layers for end in (layer.bottom_mm, layer.top_mm)} for c in columns_]
+    levels = {0.0, *(round(a, 9) for a, b in chain(*ends) if abs(a - b) < _NONE_MM and a > _NONE_MM)}
+    lines = [_lines(of, levels) for of in ends]
+    meet = len(set(map(len, lines))) == 1 and all(
+        np.allclose(a[:, 1], b[:, 0], atol=10 * _NONE_MM) for a, b in pairwise(lines)
+    )
+    if not (meet and all((np.diff(of, axis=0) >= -10 * _NONE_MM).all() for of in lines)):  # or some cross
         raise OutOfRange(
             "a virtual specimen of a section whose sloping interfaces end inside it; print it: what is printed in "
             "layers has level ones"
@@ -97,24 +101,10 @@ def _interfaces(columns_: Sequence[SectionColumn]) -> list[Real]:
     return lines
 
 
-def _levels(columns_: Sequence[SectionColumn]) -> list[float]:
-    """Heights at which some interface is level."""
-    ends = (end for column in columns_ for layer in column.layers for end in (layer.bottom_mm, layer.top_mm))
-    level = sorted({round(a, 9) for a, b in ends if abs(a - b) < _NONE_MM})
-    return [0.0, *(z for z in level if z > _NONE_MM)]
-
-
-def _lines(column: SectionColumn, levels: Sequence[float]) -> Real:
+def _lines(ends: Collection[Point], levels: Collection[float]) -> Real:
     """Heights of all interfaces of a column at its sides, upwards (k, 2) [mm]: its sloping ones and all levels."""
-    ends = {end for layer in column.layers for end in (layer.bottom_mm, layer.top_mm)}
     sloping = [end for end in ends if abs(end[0] - end[1]) >= _NONE_MM]
     return np.array(sorted([*((z, z) for z in levels), *sloping], key=lambda e: (round(sum(e), 9), e)))
-
-
-def _joined(lines: Sequence[Real]) -> bool:
-    """Test whether interfaces of neighbours meet, and none crosses another."""
-    meet = all(np.allclose(a[:, 1], b[:, 0], atol=10 * _NONE_MM) for a, b in pairwise(lines))
-    return meet and all((np.diff(of, axis=0) >= -10 * _NONE_MM).all() for of in lines)
 
 
 def _kinds(
