@@ -10,7 +10,7 @@ import json
 import os
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -42,26 +42,20 @@ class Appended:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        try:
+        with self._faults():
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
-        except OSError as error:
-            raise self._failed(error) from None
 
     def write(self, text: str) -> None:
         """Append rows; with the system when this returns."""
         left = text.encode()
-        try:
+        with self._faults():
             while left:
                 left = left[os.write(self._file, left) :]
-        except OSError as error:
-            raise self._failed(error) from None
 
     def sync(self) -> None:
         """Return when all is on the disk, at its path."""
-        try:
+        with self._faults():
             os.fsync(self._file)
-        except OSError as error:
-            raise self._failed(error) from None
         if not self._there():
             raise Unwritable(f"{str(self._path)!r} was removed during the run")
 
@@ -69,13 +63,11 @@ class Appended:
         """Sync and close; a file that was removed is written again, and named as an error."""
         try:
             if not self._there():
-                with files.replacing(self._path) as copy:
+                with self._faults(), files.replacing(self._path) as copy:
                     for at in range(0, os.fstat(self._file).st_size, 1 << 20):
                         copy.write(os.pread(self._file, 1 << 20, at))
                 raise Unwritable(f"{str(self._path)!r} was removed during the run, and is written again")
             self.sync()
-        except OSError as error:
-            raise self._failed(error) from None
         finally:
             os.close(self._file)
 
@@ -85,8 +77,14 @@ class Appended:
             return os.path.samestat(os.fstat(self._file), self._path.stat())
         return False
 
-    def _failed(self, error: OSError) -> Unwritable:
-        return Unwritable(f"cannot write to {str(self._path)!r}: {error.strerror or error}; make room on the disk")
+    @contextmanager
+    def _faults(self) -> Iterator[None]:
+        """Translate errors of the file system to Unwritable."""
+        try:
+            yield
+        except OSError as error:
+            message = f"cannot write to {str(self._path)!r}: {error.strerror or error}; make room on the disk"
+            raise Unwritable(message) from None
 
 
 class SyncedFiles:

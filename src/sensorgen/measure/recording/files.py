@@ -9,6 +9,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, within
+from sensorgen.core.files import reading
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording import samples
 from sensorgen.measure.recording.samples import MOST_TONES, MOST_VALUES, Recording, Source
@@ -128,10 +129,8 @@ def parts(path: Path | str, columns: Mapping[str, str] | None = None) -> Iterato
         file_format = "MATLAB 7.3" if matlab else "HDF5"
     spool = FileSpool()
     stretches = recordings(path, columns or {}) if file_format == "CSV" else _stretches(path, file_format, spool)
-    try:
+    with reading(path):
         yield from samples.numbered(_relieved(path, stretches, spool))
-    except OSError as error:
-        raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
 
 
 def _stretches(path: Path, file_format: str, spool: FileSpool) -> Iterator[tuple[Recording, ...]]:

@@ -9,7 +9,7 @@ with them; where they go back for good, the computer's clock was set, and the ti
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Self
 
 import numpy as np
@@ -228,15 +228,11 @@ def at_pauses(recordings: tuple[Recording, ...]) -> list[tuple[Recording, ...]]:
 
 def numbered(parts: Iterable[tuple[Recording, ...]]) -> Iterator[tuple[Recording, ...]]:
     """Parts of a file with their numbers, and with a remark where they begin; the only one has none."""
-    number, ended = 0, 0.0
-    following = iter(parts)
-    now = next(following, None)
-    while now is not None:
-        then = next(following, None)
-        number += 1
+    ended = 0.0
+    for number, (now, then) in enumerate(pairwise(chain(parts, [()])), 1):
         of = number if then or number > 1 else 0
         yield tuple(replace(one, source=_source(one, of, ended)) for one in now)
-        ended, now = float(now[0].time_s[-1]), then
+        ended = float(now[0].time_s[-1])
 
 
 def _source(one: Recording, part: int, ended_s: float) -> Source:

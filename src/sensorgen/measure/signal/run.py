@@ -6,8 +6,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording.join import Joined, joined
-from sensorgen.measure.recording.rig import RigLog
+from sensorgen.measure.recording.rig import Joined, RigLog, joined
 from sensorgen.measure.recording.samples import Recording
 from sensorgen.measure.signal import drift, lowpass, presses
 from sensorgen.measure.signal.presses import THRESHOLD_N, by_force

@@ -8,8 +8,9 @@ standard error (Korn and Graubard 1998).
 
 from array import array
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from math import comb, isnan, nan, prod
 from statistics import median
 from typing import Any
@@ -229,14 +230,9 @@ def _drawn(sizes: Sequence[int], seen: Sequence[int]) -> float:
     return (1 + unlikely) / (1 + _DRAWS)
 
 
-def _every(sizes: Sequence[int], did: int) -> Iterable[int]:
+def _every(sizes: Sequence[int], did: int) -> Iterator[int]:
     """Number of arrangements of each table with the same sums."""
-    if not sizes:
-        return [1] if did == 0 else []
-    rest = sizes[1:]
-    room = sum(rest)
-    return [
-        comb(sizes[0], k) * ways
-        for k in range(max(0, did - room), min(sizes[0], did) + 1)
-        for ways in _every(rest, did - k)
-    ]
+    *others, largest = sorted(sizes) or [0]
+    for counts in product(*(range(n + 1) for n in others)):
+        if 0 <= (left := did - sum(counts)) <= largest:
+            yield prod(map(comb, others, counts)) * comb(largest, left)
