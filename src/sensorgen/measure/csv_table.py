@@ -157,10 +157,9 @@ class CsvTable:
             if truncated and not last.endswith("\n") and last.count(self._separator) < len(self.names) - 1:
                 self.truncated = True
                 batch.pop()
-            filled = [(row, line) for row, line in batch if not line.isspace()]
-            if filled:
+            if filled := [(row, line) for row, line in batch if not line.isspace()]:
                 empty = False
-                yield self._block([row for row, _ in filled], [line for _, line in filled], numbers, text, dates)
+                yield self._block(filled, numbers, text, dates)
         if empty:
             raise BadInput(f"{self.name}: no rows below the header")
 
@@ -189,10 +188,10 @@ class CsvTable:
         return line
 
     def _block(
-        self, rows: list[int], lines: list[str], numbers: Sequence[int], text: Sequence[int], dates: Collection[int]
+        self, batch: Sequence[tuple[int, str]], numbers: Sequence[int], text: Sequence[int], dates: Collection[int]
     ) -> TableRows:
-        simple = all(line.count(self._separator) == len(self.names) - 1 and '"' not in line for line in lines)
-        values = self._converted_at_once(lines, numbers) if simple else None
+        rows, lines = map(list, zip(*batch, strict=True))
+        values = self._converted_at_once(lines, numbers)
         if values is not None:  # no quotes: every separator separates, and splitting is faster
             cells = [line.rstrip("\r\n").split(self._separator) if text else [] for line in lines]
         else:
@@ -208,7 +207,9 @@ class CsvTable:
             raise error.within(f"{self.name}, row {row}, column {self.names[at]}") from None
 
     def _converted_at_once(self, lines: list[str], numbers: Sequence[int]) -> NDArray[np.float64] | None:
-        """All numbers of a block, or None where a cell is empty, no number, or infinite."""
+        """All numbers of a block, or None where a cell is quoted, empty, no number, or infinite."""
+        if any('"' in line or line.count(self._separator) != len(self.names) - 1 for line in lines):
+            return None
         if self._separator == ";":
             lines = [line.replace(",", ".") for line in lines]
         try:

@@ -4,7 +4,7 @@ import queue
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
@@ -293,9 +293,9 @@ class Session:
         self._asked, self._log, self._stack = asked, log, ExitStack()
         experiment = asked.experiment
         plan = planned(experiment, log)  # refuses what is wrong before a line is opened
-        self._clock: Clock = SimulatedClock() if asked.simulated and not real_time else RealClock()
-        if isinstance(self._clock, SimulatedClock):
-            self._clock = replace(self._clock, epoch_s=RealClock().epoch())
+        self._clock: Clock = RealClock()
+        if asked.simulated and not real_time:
+            self._clock = SimulatedClock(epoch_s=self._clock.epoch())
         needed = page or any(part.kind == "next" for part in experiment.plan)
         self._model = ByModel(model(_design(experiment, log), experiment)) if needed and model else None
         self.mechanism: Mechanism | None = None

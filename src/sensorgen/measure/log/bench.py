@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput
@@ -123,6 +124,7 @@ class RecordingFacts:
             yield from self.rig.words()
 
 
+_SAME_NAMES: Mapping[str, str] = MappingProxyType({})
 _CLOCK = ("offset_s", "offset_error_s", "skew", "skew_error", "explained")
 
 
@@ -166,26 +168,28 @@ def summarised(
     from sensorgen.measure.recording import joined_all
 
     lockins: dict[int, LockIn] = {}
-    beside, fault = None, None
+    beside, faults = None, list[BadInput]()
     for recordings in parts:
         marked = recordings
         if rig:
             try:
                 joined = joined_all(recordings, rig)
             except BadInput as error:
-                fault = fault or error
+                faults.append(error)
             else:
                 marked = tuple(one.recording for one in joined)  # joining marks the rig's errors
                 beside = _with_rig(beside, joined[0], rig)
         for one in map(lockin, marked):
-            lockins[one.lockin] = _longer(lockins[one.lockin], one) if one.lockin in lockins else one
-    if rig and beside is None and fault:  # as of a sensor with a hole, which does not respond to the force
-        beside = RigDay(len(rig.time_s), int(rig.error.sum()), clocks=f"not joined with the rig: {fault}")
+            lockins[one.lockin] = _longer(lockins.get(one.lockin), one)
+    if rig and beside is None and faults:  # as of a sensor with a hole, which does not respond to the force
+        beside = RigDay(len(rig.time_s), int(rig.error.sum()), clocks=f"not joined with the rig: {faults[0]}")
     return RecordingFacts(tuple(lockins.values()), dict(columns), dict(rig_columns), beside)
 
 
-def _longer(before: LockIn, part: LockIn) -> LockIn:
+def _longer(before: LockIn | None, part: LockIn) -> LockIn:
     """Summary with one more part."""
+    if before is None:
+        return part
     counts = {name: count + part.counts[name] for name, count in before.counts.items()}
     return replace(before, counts=counts, seconds=part.seconds, notes=(*before.notes, *part.notes))
 
@@ -219,8 +223,8 @@ def log_recording(
     recording: Path,
     rig: Path | None = None,
     *,
-    columns: Mapping[str, str] | None = None,
-    rig_columns: Mapping[str, str] | None = None,
+    columns: Mapping[str, str] = _SAME_NAMES,
+    rig_columns: Mapping[str, str] = _SAME_NAMES,
     remark: str = "",
     supersedes: str = "",
 ) -> list[Entry]:
@@ -261,15 +265,17 @@ def log_recording(
         checked_head(path, MOST_BYTES, "a recording")
     before = [files.raw_file(path) for path in paths]
     rig_log = recordings.rig(rig, rig_columns) if rig else None
-    summary = summarised(recordings.parts(recording, columns), dict(columns or {}), rig_log, dict(rig_columns or {}))
+    summary = summarised(recordings.parts(recording, columns), dict(columns), rig_log, dict(rig_columns))
     raw_files = [files.keep(log.files, path) for path in paths]
     if raw_files != before:
         raise BadInput(f"{str(recording)!r} {files.CHANGED}")
-    identity = " ".join(filter(None, (of.specimen, *(file.uid for file in raw_files), supersedes)))
+    uids = [file.uid for file in raw_files]
+    identity = " ".join(filter(None, (of.specimen, *uids, supersedes)))
+    file, rig_file = (*uids, "")[:2]
     run = BenchRun(
         **vars(of), uid=sha256(identity.encode()).hexdigest()[:32], written=specimen, design_id=design_id,
-        design=design, source=recording.name, remark=remark, supersedes=supersedes, file=raw_files[0].uid,
-        rig_file=raw_files[1].uid if rig else "", facts=to_json(summary),
+        design=design, source=recording.name, remark=remark, supersedes=supersedes, file=file, rig_file=rig_file,
+        facts=to_json(summary),
     )  # fmt: skip
     return [row for row in log.add([*raw_files, run]) if isinstance(row, BenchRun)]
 

@@ -2,11 +2,11 @@
 
 import json
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from itertools import chain, count
+from itertools import count
 from operator import attrgetter
 from pathlib import Path
 
@@ -171,7 +171,9 @@ def corrections(log: Log, rows: Iterable[Reading], table: str) -> Iterator[Readi
 def _correction(log: Log, row: Reading, gone: dict[str, Reading], table: str, *, alike: bool) -> Reading:
     """Row as the correction of one that has gone from its table, and is taken out of these; itself if it is new."""
     taken_back = next(log.entries(Reading, replaced=True, uid=row.uid), None) is not None  # an edit, perhaps
-    old = _edited(row, gone.values(), alike=alike, elsewhere=not taken_back)
+    same = [old for old in gone.values() if _measured(old) == _measured(row)]
+    moved = [] if taken_back else [old for old in same if old.specimen == row.specimen]
+    old = _in_place(row, gone.values(), same, alike=alike) or next(iter(moved), None)
     if old:
         del gone[old.uid]
         uid = sha256(f"{row.uid} {old.uid}".encode()).hexdigest()[:32] if taken_back else row.uid
@@ -186,16 +188,10 @@ def _correction(log: Log, row: Reading, gone: dict[str, Reading], table: str, *,
     return row
 
 
-def _edited(row: Reading, gone: Collection[Reading], *, alike: bool, elsewhere: bool) -> Reading | None:
-    """Reading that a row comes from.
-
-    One in its place with its values, or, of a table that is ``alike`` otherwise, of its specimen; else one
-    ``elsewhere`` of its specimen with its values.
-    """
+def _in_place(row: Reading, gone: Iterable[Reading], same: Sequence[Reading], *, alike: bool) -> Reading | None:
+    """Reading in a row's place with the same values, or, of a table that is ``alike`` otherwise, of its specimen."""
     here = (old for old in gone if old.source_row == row.source_row)
-    in_place = (o for o in here if _measured(o) == _measured(row) or (alike and o.specimen == row.specimen))
-    moved = (o for o in gone if elsewhere and o.specimen == row.specimen and _measured(o) == _measured(row))
-    return next(chain(in_place, moved), None)
+    return next((old for old in here if old in same or (alike and old.specimen == row.specimen)), None)
 
 
 _MOST_DOUBTS = 5  # of implausible values in one file

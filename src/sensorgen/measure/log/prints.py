@@ -193,10 +193,7 @@ def bind(
     if printed and len(names) > 1:
         raise BadInput(f"--printed {shown(printed)} is one specimen; expected one name for it, not {len(names)}")
     on_bed = _on_bed(log, printed) if printed else None
-    identity = on_bed.design_id if on_bed else ""
-    of = designs(log).get(identity) if on_bed else _design(log, design)
-    if of is None:
-        raise MissingValue(f"the log has design {identity} by its identity alone; give its file: --design FILE")
+    of = _logged(log, on_bed.design_id) if on_bed else _design(log, design)
     rows = list(_prints(log, names, of, on_bed, iteration))
     new = log.add([design_row(of.id(), of.name, of.resolved()), *rows]) if rows else []
     return [row for row in new if isinstance(row, Print)]
@@ -244,6 +241,12 @@ def _design(log: Log, design: str) -> Design:
     known = ", ".join(sorted({of.name for of in designs(log).values()})) or "none"
     why = f"{len(named)} designs have that name, {', '.join(named)}" if named else f"designs in the log: {known}"
     raise BadInput(f"--design {shown(design)}: expected a design file, as mine.yaml, or the identity of one ({why})")
+
+
+def _logged(log: Log, design_id: str) -> Design:
+    if (design := designs(log).get(design_id)) is None:
+        raise MissingValue(f"the log has design {design_id} by its identity alone; give its file: --design FILE")
+    return design
 
 
 def _check_measured(log: Log, name: str, design_id: str, design: str) -> None:

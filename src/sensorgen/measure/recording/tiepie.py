@@ -4,8 +4,10 @@ Whether a variable is a scalar, a vector, a cell or a struct array depends on th
 on the program that wrote the file, so that everything is flattened first.
 """
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from math import ceil
 from typing import Any, Self
 
@@ -24,6 +26,7 @@ _EXPECTED = "expected a recording of TiePieLCR: impedance_data with lockin1, imp
 
 _MOST_MEANS = 1 << 20  # of an input's means; of more, the largest of several
 
+_LOCKIN = re.compile(r"lockin[0-9]+")
 Tree = Mapping[str, Any]
 Vector = NDArray[Any]
 """Numbers of any type as they are in the file, outside memory."""
@@ -50,10 +53,10 @@ def recordings(tree: Tree, source: Source) -> Iterator[tuple[Recording, ...]]:
     settings = list(_structs(tree.get("settings")))
     if len(settings) != count:
         raise BadInput(f"settings: {len(settings)} structs for {count} lock-ins; expected one each")
-    stamps = _vector(tree["timestamps"], "timestamps") if "timestamps" in tree else None
+    stamps = [_vector(tree["timestamps"], "timestamps") if "timestamps" in tree else None]  # of the first alone
     given = [
-        _LockIn.of(tree, k, count, name, raw, own, time, stamps if k == 0 else None)  # only the first is stamped
-        for k, ((name, raw), own, time) in enumerate(zip(lockins.items(), settings, times, strict=True))
+        _LockIn.of(tree, k, count, name, raw, own, time, stamp)
+        for k, ((name, raw), own, time, stamp) in enumerate(zip_longest(lockins.items(), settings, times, stamps))
     ]
     for at in stretches(max(one.count for one in given), sum(len(one.tones_hz) for one in given)):
         results: list[Recording] = []
@@ -69,7 +72,7 @@ def _lockins(tree: Tree) -> dict[str, Any]:
     data = tree.get("impedance_data")
     if not isinstance(data, list) or len(data) != 1 or not isinstance(data[0], dict):
         raise BadInput(f"impedance_data is {_described(data)}; {_EXPECTED}")
-    names = [name for name in data[0] if name.startswith("lockin") and name[6:].isascii() and name[6:].isdigit()]
+    names = list(filter(_LOCKIN.fullmatch, data[0]))
     if not names:
         raise BadInput(f"impedance_data has the fields {', '.join(list(data[0])[:8]) or 'none'}; {_EXPECTED}")
     return {name: data[0][name] for name in sorted(names, key=lambda name: int(name[6:]))}

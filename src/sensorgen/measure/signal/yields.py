@@ -10,7 +10,7 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain, product
 from math import comb, isnan, nan, prod
 from statistics import median
 from typing import Any
@@ -205,9 +205,9 @@ def independence(table: Sequence[tuple[int, int]]) -> float:
     >>> round(independence([(4, 0), (0, 4)]), 4)
     0.0286
     """
-    if any(n < 0 for row in table for n in row):
+    if min(chain([0], *table)) < 0:
         raise OutOfRange("expected counts from 0 on")
-    sizes, seen = [a + b for a, b in table], [a for a, _ in table]
+    sizes, seen = list(map(sum, table)), [a for a, _ in table]
     if sum(sizes) > _MOST or prod(sorted(n + 1 for n in sizes)[:-1]) > _MOST_TABLES:
         return _drawn(sizes, seen)
     ways = prod(comb(n, k) for k, n in zip(seen, sizes, strict=True))

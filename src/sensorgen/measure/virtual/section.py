@@ -62,21 +62,16 @@ def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM)
     rows = [max(round(np.max([of[k + 1] - of[k] for of in lines]) / fine_mm), 1) for k in range(len(lines[0]) - 1)]
     pieces = [1] if len(columns_) == 1 else [max(int(np.ceil((b - a) / widest - 1e-6)), 1) for a, b in pairwise(sides)]
     shares = np.concatenate([[0.0], *(k + graded(n) for k, n in enumerate(rows))])
-    x, material, electrode = [sides[0]], [], []
-    z = list[Real]()
+    x, z, kinds = [sides[0]], list[Real](), list[Whole]()
     for column, of, n in zip(columns_, lines, pieces, strict=True):
         x += (column.left_mm + (column.right_mm - column.left_mm) * graded(n)).tolist()
         ends = [np.interp(shares, np.arange(len(of)), of[:, side]) for side in (0, 1)]
         at = [0.0, *graded(n).tolist()]
         z += [ends[0] + (ends[1] - ends[0]) * share for share in at[bool(z) :]]
         for share in np.add(at[1:], at[:-1]) / 2:
-            kinds = _kinds(column, ends, share, materials)
-            material.append(kinds[0])
-            electrode.append(kinds[1])
-    return SectionRaster(
-        np.array(x) * M_PER_MM, np.array(z).T * M_PER_MM, np.array(material).T, np.array(electrode).T,
-        scene.repeats[across],
-    )  # fmt: skip
+            kinds.append(_kinds(column, ends, share, materials))
+    material, electrode = np.moveaxis(np.array(kinds), 0, 2)
+    return SectionRaster(np.array(x) * M_PER_MM, np.array(z).T * M_PER_MM, material, electrode, scene.repeats[across])
 
 
 def graded(count: int) -> Real:
@@ -90,10 +85,7 @@ def _interfaces(columns_: Sequence[SectionColumn]) -> list[Real]:
     ends = [{end for layer in c.layers for end in (layer.bottom_mm, layer.top_mm)} for c in columns_]
     levels = {0.0, *(round(a, 9) for a, b in chain(*ends) if abs(a - b) < _NONE_MM and a > _NONE_MM)}
     lines = [_lines(of, levels) for of in ends]
-    meet = len(set(map(len, lines))) == 1 and all(
-        np.allclose(a[:, 1], b[:, 0], atol=10 * _NONE_MM) for a, b in pairwise(lines)
-    )
-    if not (meet and all((np.diff(of, axis=0) >= -10 * _NONE_MM).all() for of in lines)):  # or some cross
+    if len(set(map(len, lines))) > 1 or not _joined(lines):
         raise OutOfRange(
             "a virtual specimen of a section whose sloping interfaces end inside it; print it: what is printed in "
             "layers has level ones"
@@ -107,21 +99,24 @@ def _lines(ends: Collection[Point], levels: Collection[float]) -> Real:
     return np.array(sorted([*((z, z) for z in levels), *sloping], key=lambda e: (round(sum(e), 9), e)))
 
 
-def _kinds(
-    column: SectionColumn, ends: Sequence[Real], share: float, materials: Mapping[str, int]
-) -> tuple[list[int], list[int]]:
-    """Materials and terminals of a column's elements, upwards, at a share of its width."""
+def _joined(lines: Sequence[Real]) -> bool:
+    """Test whether interfaces of neighbours meet, and none crosses another."""
+    meet = all(np.allclose(a[:, 1], b[:, 0], atol=10 * _NONE_MM) for a, b in pairwise(lines))
+    return meet and all((np.diff(of, axis=0) >= -10 * _NONE_MM).all() for of in lines)
+
+
+def _kinds(column: SectionColumn, ends: Sequence[Real], share: float, materials: Mapping[str, int]) -> Whole:
+    """Materials and terminals of a column's elements, upwards, at a share of its width (2, n)."""
     z = ends[0] + (ends[1] - ends[0]) * share
     spans = [tuple(e[0] + (e[1] - e[0]) * share for e in (layer.bottom_mm, layer.top_mm)) for layer in column.layers]
     bottoms = [low for low, _ in spans]
-    bodies: list[Body | None] = []
-    for middle in ((z[1:] + z[:-1]) / 2).tolist():
+    kinds = np.zeros((2, len(z) - 1), int)
+    for n, middle in enumerate(((z[1:] + z[:-1]) / 2).tolist()):
         k = bisect_right(bottoms, middle) - 1
-        bodies.append(column.layers[k].body if k >= 0 and middle < spans[k][1] else None)
-    return (
-        [materials[b.material] if b else 0 for b in bodies],
-        [TERMINALS.get(b.terminal, 0) if b else 0 for b in bodies],
-    )
+        if k >= 0 and middle < spans[k][1]:
+            body = column.layers[k].body
+            kinds[:, n] = materials[body.material], TERMINALS.get(body.terminal, 0)
+    return kinds
 
 
 _STEP_MM = 1e-6
