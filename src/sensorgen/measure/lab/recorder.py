@@ -26,7 +26,7 @@ from sensorgen.measure.lab.devices import Clock, Readings
 if TYPE_CHECKING:
     from sensorgen.measure.log import BenchRun, Log
 
-JOURNAL, EXPERIMENT = "journal.jsonl", "experiment.json"
+JOURNAL = "journal.jsonl"
 _SYNC_S = 0.5  # so that all that is older than a second is on the disk
 _RIG = "stamp_s,set_force_n,set_position_mm,force_n,error\n"
 
