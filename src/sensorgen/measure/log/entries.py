@@ -435,19 +435,14 @@ def columns(kind: type[Entry]) -> dict[str, Any]:
     return _COLUMNS[kind]
 
 
-def encode(entry: Entry) -> str:
-    """Content of a row's record.
+def content_of(entry: Entry) -> dict[str, Any]:
+    """Fields of a row that its record holds: those that are not as usual.
 
     Raises
     ------
     BadInput
         A value that the field cannot have.
     """
-    return encoded(content_of(entry))
-
-
-def content_of(entry: Entry) -> dict[str, Any]:
-    """Fields of a row that its record holds: those that are not as usual; errors as of :func:`encode`."""
     kind = type(entry)
     types = _HELD[kind]
     values = zip(types, _USUAL[kind], _VALUES[kind](entry), strict=True)
