@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -22,9 +22,8 @@ from sensorgen.core import files, units
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, Unwritable
 from sensorgen.measure.lab.devices import Clock, Readings
-
-if TYPE_CHECKING:
-    from sensorgen.measure.log import BenchRun, Log
+from sensorgen.measure.log import BenchRun, Log
+from sensorgen.measure.log.bench import log_recording
 
 JOURNAL = "journal.jsonl"
 _SYNC_S = 0.5  # so that all that is older than a second is on the disk
@@ -268,7 +267,7 @@ def alone(folder: Path) -> AbstractContextManager[bool]:
     return files.alone(folder / ".lock", wait=False)
 
 
-def log_attempts(log: "Log", folder: Path, clock: Clock) -> "list[BenchRun]":
+def log_attempts(log: Log, folder: Path, clock: Clock) -> list[BenchRun]:
     """Log the attempts of a run that the log does not have yet; hold the run's lock.
 
     What cannot be logged, as of a run that was killed before its first reading, is noted in the journal.
@@ -291,10 +290,7 @@ def log_attempts(log: "Log", folder: Path, clock: Clock) -> "list[BenchRun]":
     return rows
 
 
-def _logged(log: "Log", folder: Path, attempt: dict[str, Any]) -> "tuple[list[BenchRun], str]":
-    from sensorgen.measure.log import BenchRun
-    from sensorgen.measure.log.bench import log_recording
-
+def _logged(log: Log, folder: Path, attempt: dict[str, Any]) -> tuple[list[BenchRun], str]:
     recording, rig = folder / f"{attempt['stem']}.csv", folder / f"{attempt['stem']}-rig.csv"
     for path in (recording, rig):
         trim(path)
@@ -323,7 +319,7 @@ def trim(path: Path) -> None:
             end = begin
 
 
-def recover(log: "Log", clock: Clock) -> "list[BenchRun]":
+def recover(log: Log, clock: Clock) -> list[BenchRun]:
     """Log what killed runs of a log have left; runs that go on in other processes are passed over."""
     rows: list[BenchRun] = []
     for folder in sorted(home(log.path).glob("*/")) if home(log.path).is_dir() else ():

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from math import ceil, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,11 +25,7 @@ from sensorgen.measure.lab.loop import Alive, Loop, Paused, Predicted, RunView
 from sensorgen.measure.lab.recorder import Recorder, RunFolder
 from sensorgen.measure.lab.safety import Ended, RunDevices
 from sensorgen.measure.lab.watch import Watch
-from sensorgen.measure.log import notes
-from sensorgen.measure.log.entries import BenchRun
-
-if TYPE_CHECKING:
-    from sensorgen.measure.log import Log
+from sensorgen.measure.log import BenchRun, Log, notes
 
 Confirm = Callable[["PlannedRun", dict[str, Identity]], bool]
 """Whether the rig may move, by what is planned and what each device said that it is."""
@@ -127,7 +123,7 @@ class PlannedRun:
         )
 
 
-def planned(experiment: Experiment, log: "Log | None" = None) -> PlannedRun:
+def planned(experiment: Experiment, log: Log | None = None) -> PlannedRun:
     """Check an experiment against its specimen, and make its presses; nothing moves.
 
     Raises
@@ -147,7 +143,7 @@ def planned(experiment: Experiment, log: "Log | None" = None) -> PlannedRun:
     return PlannedRun(experiment, length, tuple(steps), seconds)
 
 
-def design_of(experiment: Experiment, log: "Log | None") -> Design | None:
+def design_of(experiment: Experiment, log: Log | None) -> Design | None:
     """Design of the specimen: the virtual one's own, else that in the log, else the one that its name stands for."""
     from sensorgen.measure.log import prints
 
@@ -164,7 +160,7 @@ def design_of(experiment: Experiment, log: "Log | None") -> Design | None:
 
 
 def run(
-    experiment: Experiment, *, clock: Clock, log: "Log", rig: RunDevices, simulated: bool, view: RunView | None = None,
+    experiment: Experiment, *, clock: Clock, log: Log, rig: RunDevices, simulated: bool, view: RunView | None = None,
     controls: Controls | None = None, guardian: Alive | None = None, next_press: NextPress | None = None,
     predicted: Predicted | None = None, resume: Path | None = None, confirm: Confirm = lambda *_: True,
     watchdog: bool = True,
@@ -230,7 +226,7 @@ class _Attempt:
     """One attempt at a run: the first, or one that resumes it."""
 
     def __init__(
-        self, plan: PlannedRun, clock: Clock, log: "Log", rig: RunDevices, folder: Path, simulated: bool,
+        self, plan: PlannedRun, clock: Clock, log: Log, rig: RunDevices, folder: Path, simulated: bool,
         next_press: NextPress | None, confirm: Confirm, watchdog: bool,
     ) -> None:  # fmt: skip
         self.plan, self.clock, self.log, self.rig, self.folder = plan, clock, log, rig, folder
