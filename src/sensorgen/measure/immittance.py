@@ -130,18 +130,14 @@ def factor(quantity: str, unit: str) -> Decimal:
     (Decimal('1E-12'), Decimal('1000'), Decimal('0.01'), Decimal('1'), Decimal('1000'))
     """
     wanted = UNITS.get(quantity, "Hz")
-    if not unit or unit == wanted:
-        return Decimal(1)
-    for length in range(len(unit)):  # the prefix is what stands before the unit
+    for length in range(len(unit) + 1):  # the prefix is what stands before the unit, or alone, as in 12.3p
         base = unit[length:]
         base = base if base == wanted else _SPELLINGS.get(base, _SPELLINGS.get(base.casefold(), base.casefold()))
         prefix = _PREFIX.get(unit[:length])
-        if prefix is not None and base == wanted:
+        if prefix is not None and base in (wanted, ""):
             return prefix
         if length == 0 and (wanted, base) in _SCALES:
             return _SCALES[wanted, base]
-    if unit in _PREFIX:  # 12.3p
-        return _PREFIX[unit]
     raise BadInput(f"unit {unit!r:.20}; expected {wanted or 'none, or %'}{' or deg' * (wanted == 'rad')}")
 
 

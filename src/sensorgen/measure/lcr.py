@@ -283,7 +283,7 @@ def _numbers(cells: Sequence[str], columns: Sequence[_Column], where: str) -> It
 
 def _readings(rows: Sequence[_Row], columns: Sequence[_Column], path: Path) -> Iterator[AcReading]:
     degrees = _degrees(rows, columns, path)
-    at = next(column for column in columns if column.quantity == "frequency")
+    at = {column.quantity: column for column in columns}["frequency"]
     for row in rows:
         frequency, _ = row.pop(at, (math.nan, False))
         if frequency < 0 or (frequency == 0 and row):

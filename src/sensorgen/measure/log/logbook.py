@@ -193,7 +193,7 @@ class Log:
             "SELECT kind, content, number, logged_at FROM record "  # noqa: S608
             f"WHERE kind = ?1 AND number IS NOT NULL AND {where} ORDER BY number {'DESC' if last else ''}"
         )
-        rows = (self._row(*row) for row in self._rows(sql, [NAMES[kind], *asked.values()]))
+        rows = itertools.starmap(self._row, self._rows(sql, [NAMES[kind], *asked.values()]))
         wanted = (row for row in rows if all(getattr(row, name) == value for name, value in equal.items()))
         yield from reversed(list(itertools.islice(wanted, last))) if last else wanted
 

@@ -110,7 +110,7 @@ class _Reader:
     def _struct(self, group: Any, depth: int) -> list[dict[str, Any]]:
         """Struct; an array of structs is a group whose fields are lists of references without a class."""
         fields = {name: self.member(group, name, depth + 1) for name in group}
-        members = [group[name] for name in group]
+        members = list(group.values())
         if members and all(self._refers(item) and _CLASS not in item.attrs for item in members):
             count = min(map(len, fields.values()))
             return [{name: values[i] for name, values in fields.items()} for i in range(count)]
