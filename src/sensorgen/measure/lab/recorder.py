@@ -7,6 +7,7 @@ the next run of the same log.
 """
 
 import json
+import mmap
 import os
 import threading
 from collections.abc import Iterator, Sequence
@@ -307,16 +308,11 @@ def _logged(log: Log, folder: Path, attempt: dict[str, Any]) -> tuple[list[Bench
 
 def trim(path: Path) -> None:
     """Cut off a last row that is not whole."""
-    with suppress(FileNotFoundError), path.open("rb+") as file:
-        end = file.seek(0, os.SEEK_END)
-        while end:
-            begin = max(0, end - (1 << 16))
-            file.seek(begin)
-            at = file.read(end - begin).rfind(b"\n")
-            if at >= 0:
-                file.truncate(begin + at + 1)
-                return
-            end = begin
+    with suppress(FileNotFoundError, ValueError), path.open("rb+") as file:  # ValueError of an empty one
+        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+            end = content.rfind(b"\n") + 1
+        if end:
+            file.truncate(end)
 
 
 def recover(log: Log, clock: Clock) -> list[BenchRun]:
