@@ -198,7 +198,7 @@ class At:
         """Mean, and its uncertainty: scatter of the repeats (type A) and the meter's limit, or what was stated."""
         z = self.z_ohm
         these = self.values.get(quantity) or [
-            float(quantity_of(quantity, each, self.frequency_hz)) for each in self.impedances if each
+            float(quantity_of(quantity, each, self.frequency_hz)) for each in self.impedances
         ]
         if not these:
             return MeasuredValue(math.nan)
@@ -219,7 +219,7 @@ def at_frequency(reading: Reading, frequency_hz: float) -> At:
             values.setdefault(name, []).append(value)
             stated[name] = max(error, stated.get(name, 0.0))
     repeats = [dict(zip(values, some, strict=True)) for some in zip(*values.values(), strict=False)]
-    known = tuple(z for one in repeats if (z := impedance(one, frequency_hz)) is not None)
+    known = tuple(z for one in repeats if (z := impedance(one, frequency_hz)))
     meter = find(reading.instrument) if reading.instrument else None
     return At(meter, frequency_hz, values, known, stated)
 

@@ -114,7 +114,7 @@ def land(loop: Loop) -> None:
         raise DeviceFault(f"actuator: still at {at:.2f} mm after the command to land; check motor and power")
     if at > deepest - _STILL_MM:
         raise DeviceFault(f"no contact down to {at:.2f} mm (limits.deepest_mm); check specimen, place and height")
-    if isfinite(loop.contact_mm) and at < loop.contact_mm - _EARLY_MM:
+    if loop.contact_mm - at > _EARLY_MM:  # never of the first contact, which is nan before
         raise DeviceFault(f"contact at {at:.2f} mm, {loop.contact_mm - at:.1f} mm above the last; is something there?")
     loop.down_mm = loop.contact_mm = at
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import filterfalse
 from math import inf
 
 from sensorgen.core.errors import SensorgenError
@@ -117,7 +118,7 @@ def _lift(rig: RunDevices, clock: Clock, attempt: _Attempts) -> dict[str, bool]:
     lifts = {"actuator": rig.actuator.lift, "stage": rig.stage.lift}
     looks = {"actuator": look_actuator, "stage": look_stage}
     while not all(up.values()) and clock.now() < (until if not up.get("stage") else until - _LIFT_S + _DEAF_S):
-        down = [role for role in up if not up[role]]
+        down = list(filterfalse(up.get, up))
         if clock.now() >= again:
             again = clock.now() + _AGAIN_S
             for role in down:

@@ -171,9 +171,7 @@ def corrections(log: Log, rows: Iterable[Reading], table: str) -> Iterator[Readi
 def _correction(log: Log, row: Reading, gone: dict[str, Reading], table: str, *, alike: bool) -> Reading:
     """Row as the correction of one that has gone from its table, and is taken out of these; itself if it is new."""
     taken_back = next(log.entries(Reading, replaced=True, uid=row.uid), None) is not None  # an edit, perhaps
-    same = [old for old in gone.values() if _measured(old) == _measured(row)]
-    moved = [] if taken_back else [old for old in same if old.specimen == row.specimen]
-    old = _in_place(row, gone.values(), same, alike=alike) or next(iter(moved), None)
+    old = _in_place(row, gone.values(), alike=alike) or (None if taken_back else _same(row, gone.values()))
     if old:
         del gone[old.uid]
         uid = sha256(f"{row.uid} {old.uid}".encode()).hexdigest()[:32] if taken_back else row.uid
@@ -188,10 +186,15 @@ def _correction(log: Log, row: Reading, gone: dict[str, Reading], table: str, *,
     return row
 
 
-def _in_place(row: Reading, gone: Iterable[Reading], same: Sequence[Reading], *, alike: bool) -> Reading | None:
-    """Reading in a row's place with the same values, or, of a table that is ``alike`` otherwise, of its specimen."""
+def _in_place(row: Reading, gone: Iterable[Reading], *, alike: bool) -> Reading | None:
+    """Reading in a row's place with its values, or, of a table that is ``alike`` otherwise, of its specimen."""
     here = (old for old in gone if old.source_row == row.source_row)
-    return next((old for old in here if old in same or (alike and old.specimen == row.specimen)), None)
+    return next((o for o in here if _measured(o) == _measured(row) or (alike and o.specimen == row.specimen)), None)
+
+
+def _same(row: Reading, gone: Iterable[Reading]) -> Reading | None:
+    """Reading of a row's specimen with its values."""
+    return next((o for o in gone if o.specimen == row.specimen and _measured(o) == _measured(row)), None)
 
 
 _MOST_DOUBTS = 5  # of implausible values in one file

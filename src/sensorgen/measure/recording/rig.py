@@ -109,11 +109,11 @@ def _read(table: CsvTable) -> RigLog:
     time_name = _STAMP if _STAMP in names else _TIME
     _check_names(table, time_name)
     force, error = ([names.index(name)] if name in names else [] for name in (_FORCE, _ERROR))
-    needed_columns = [names.index(name) for name in (time_name, *_NEEDED)]
+    needed_columns = list(map(names.index, (time_name, *_NEEDED)))
     numbers, reported = [], []
     for block in table.blocks([*needed_columns, *force], error, dates=needed_columns[:1], truncated=True):
         numbers.append(block.numbers)
-        reported.append(np.array([bool(c) and c[0].strip().lower() not in _NO_ERROR for c in block.text]))
+        reported.append(np.array(["".join(c).strip().lower() not in _NO_ERROR for c in block.text]))
         if block.rows[-1] > _MOST_ROWS:
             raise table.error(block.rows[-1], f"more rows than expected, {_MOST_ROWS}; split the log of the rig")
     values = np.concatenate(numbers)

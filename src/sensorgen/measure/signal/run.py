@@ -91,7 +91,7 @@ def processed(
             notes.append(f"drift not removed: {error}")
     try:
         pairs = presses.pairs(one.time_s, z, valid, spans, force, position) if spans else None
-        notes += [f"left out: {press}" for press in pairs.left_out] if pairs else ["nothing pressed"]
+        notes += map("left out: {}".format, pairs.left_out) if pairs else ["nothing pressed"]
     except BadInput as error:
         notes.append(f"no presses: {error}")
     return Processed(one, force, *filtered, removed, pairs, rig is not None, tuple(notes))

@@ -59,8 +59,9 @@ def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM)
     sides = [columns_[0].left_mm, *(c.right_mm for c in columns_)]
     widest = max(fine_mm, (sides[-1] - sides[0]) / _MOST_COLUMNS)
     lines = _interfaces(columns_)
-    rows = [max(round(np.max([of[k + 1] - of[k] for of in lines]) / fine_mm), 1) for k in range(len(lines[0]) - 1)]
-    pieces = [1] if len(columns_) == 1 else [max(int(np.ceil((b - a) / widest - 1e-6)), 1) for a, b in pairwise(sides)]
+    highest = np.max([np.diff(of, axis=0) for of in lines], axis=(0, 2))
+    rows = np.maximum(np.round(highest / fine_mm), 1).astype(int).tolist()
+    pieces = np.maximum(np.ceil(np.diff(sides) / widest - 1e-6), 1).astype(int).tolist() if len(columns_) > 1 else [1]
     shares = np.concatenate([[0.0], *(k + graded(n) for k, n in enumerate(rows))])
     x, z, kinds = [sides[0]], list[Real](), list[Whole]()
     for column, of, n in zip(columns_, lines, pieces, strict=True):

@@ -181,9 +181,9 @@ class SmacController(Simulator):
 
     def _control(self, value: int) -> None:
         """Control word: state machine, and the bit that begins a move or homing."""
-        before, self._objects[0x6040] = self._objects[0x6040], value
+        risen, self._objects[0x6040] = value & ~self._objects[0x6040], value
         if self._state() == 0x08:
-            if value & 0x80 and not before & 0x80:
+            if risen & 0x80:
                 self._objects |= {0x6041: 0x40, 0x603F: 0, 0x1001: 0}
             return
         low = value & 0x0F
@@ -191,7 +191,7 @@ class SmacController(Simulator):
             self._turn(0x40)
         elif low in _SWITCHED and self._state() in _FROM.get(low, (self._state(),)):
             self._turn(_SWITCHED[low])
-        if self._state() == 0x27 and value & 0x10 and not before & 0x10:
+        if self._state() == 0x27 and risen & 0x10:
             self._begin()
 
     def _turn(self, state: int) -> None:
