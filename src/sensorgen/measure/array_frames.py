@@ -102,11 +102,9 @@ def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Fram
         if path.suffix not in BINARY:
             return _joined(list(lots(str(path), shape, frequency_hz)))
         found, unused = numbers(path)
-    try:
+    with within(str(path)):
         _refuse_times(unused)
         return replace(_checked(found, shape, frequency_hz), unused=tuple(unused))
-    except BadInput as error:
-        raise error.within(str(path)) from None
 
 
 def _checked(found: dict[str, np.ndarray], shape: tuple[int, int], frequency_hz: float | None) -> Frames:

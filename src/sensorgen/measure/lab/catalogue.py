@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from sensorgen.core.errors import BadInput, NotInstalled, UnknownName
+from sensorgen.core.errors import BadInput, NotInstalled, UnknownName, within
 from sensorgen.core.records import Line, Strict, checked
 from sensorgen.measure.lab.devices import PYMEASURE, Actuator, Clock, FrameMeter, ImpedanceMeter, Meter, Role, Stage
 from sensorgen.measure.virtual.plant import Plant
@@ -178,10 +178,8 @@ def simulated(name: str, plant: Plant, settings: Mapping[str, Any], clock: Clock
 
 
 def _settings(of: Kind, name: str, settings: Mapping[str, Any]) -> Strict:
-    try:
+    with within(f"settings of {name}"):
         return checked(of.settings, settings)
-    except BadInput as error:
-        raise BadInput(f"settings of {name}: {error}") from None
 
 
 def _installed() -> dict[str, Any]:
