@@ -23,7 +23,7 @@ from pydantic import Field
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.records import Line, Strict
 from sensorgen.measure.lab.devices import Clock, DeviceFault, Identity, Place, WrongDevice
-from sensorgen.measure.lab.port import HttpPort, Port, Web
+from sensorgen.measure.lab.port import HttpPort, Port
 
 BAUD = 57_600
 _ANSWER_S, _HOMING_S, _HTTP_S = 2.0, 120.0, 1.0
@@ -194,7 +194,7 @@ class SerialLink:
 class WebLink:
     """The firmware at an address of HTTP: one request at a time, each at most a second."""
 
-    def __init__(self, web: Web, clock: Clock, password: str) -> None:
+    def __init__(self, web: HttpPort, clock: Clock, password: str) -> None:
         self.address = web.address
         self._web, self._clock, self._password = web, clock, password
         self._replies = 0
