@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from sensorgen.core import yamlfile
 from sensorgen.core.arrays import Complex, Real
@@ -24,6 +24,15 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
 Span = Annotated[tuple[Number, Number], Field(strict=False)]
+
+
+def _rising(span: tuple[float, float]) -> tuple[float, float]:
+    if not 0 < span[0] <= span[1]:
+        raise ValueError(f"{span[0]:g}, {span[1]:g}; expected numbers above 0 that rise")
+    return span
+
+
+Rising = Annotated[Span, AfterValidator(_rising)]
 Frequencies = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1, max_length=100)]
 Name = Annotated[Line, Field(min_length=1, max_length=100)]
 
@@ -149,9 +158,9 @@ class Free(Strict):
     """Presses whose force, place and hold are not given."""
 
     presses: Count
-    force_n: Span = (0.4, 6.0)
-    position_mm: Span | None = None
-    hold_s: Span = (0.3, 30.0)
+    force_n: Rising = (0.4, 6.0)
+    position_mm: Rising | None = None
+    hold_s: Rising = (0.3, 30.0)
     rest_s: Positive = 4.0
 
 
@@ -388,9 +397,7 @@ def _largest_n(key: str, part: Kind) -> tuple[float, str]:
         if part.amplitude_n >= part.mean_n:
             raise OutOfRange(f"{key}.amplitude_n: {part.amplitude_n:g} N lifts the tip; expected less than mean_n")
         return part.mean_n + part.amplitude_n, "mean_n + amplitude_n"
-    forces = part.force_n if isinstance(part.force_n, tuple) else (part.force_n,)
-    _rising(f"{key}.force_n", forces)
-    return max(forces), "force_n"
+    return float(np.max(part.force_n)), "force_n"
 
 
 def _check_part(key: str, part: Kind, limit_n: float, places_mm: tuple[float, float]) -> None:
@@ -400,13 +407,8 @@ def _check_part(key: str, part: Kind, limit_n: float, places_mm: tuple[float, fl
             f"{key}.{name}: {largest:g} N; expected up to {_ROOM * limit_n:.4g} N, {_ROOM:.0%} of limits.force_n, "
             "above which the tip is lifted"
         )
-    if isinstance(part, Free):
-        _rising(f"{key}.hold_s", part.hold_s)
-    where = part.position_mm
-    for place in () if where is None else where if isinstance(where, tuple) else (where,):
+    for place in () if part.position_mm is None else np.ravel(part.position_mm).tolist():
         _inside(f"{key}.position_mm", place, places_mm)
-    if isinstance(where, tuple) and not isinstance(part, ForceSweep):
-        _rising(f"{key}.position_mm", where)
 
 
 def check_press(experiment: Experiment, force_n: float, place_mm: float, length_mm: float) -> None:
@@ -414,11 +416,6 @@ def check_press(experiment: Experiment, force_n: float, place_mm: float, length_
     if not 0 < force_n <= _ROOM * experiment.limits.force_n:
         raise OutOfRange(f"next press: {force_n:g} N; expected up to {_ROOM * experiment.limits.force_n:.4g} N")
     _inside("next press", place_mm, experiment.places_mm(length_mm))
-
-
-def _rising(key: str, span: tuple[float, ...]) -> None:
-    if span[0] <= 0 or span[0] > span[-1]:
-        raise OutOfRange(f"{key}: {', '.join(f'{value:g}' for value in span)}; expected numbers above 0 that rise")
 
 
 def _inside(key: str, place_mm: float, allowed_mm: tuple[float, float]) -> None:
