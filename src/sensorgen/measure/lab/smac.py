@@ -411,10 +411,8 @@ class SmacActuator:
             state.direction = 1 if count > state.count else -1
             state.count = count
         return (
-            units * self.settings.newton_per_unit
-            + self.settings.weight_n
-            - state.direction * self.settings.friction_n
-        )  # fmt: skip
+            units * self.settings.newton_per_unit + self.settings.weight_n - state.direction * self.settings.friction_n
+        )
 
     def _set(self, *pairs: tuple[int, int], node: int | None = None) -> None:
         to = self.settings.node if node is None else node

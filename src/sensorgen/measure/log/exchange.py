@@ -145,9 +145,7 @@ def from_csv(kind: type[Entry], table: CsvTable) -> Iterator[Entry]:
         yield _entry(kind, values, f"{table.name}, row {number}", convert)
 
 
-def _entry(
-    kind: type[Entry], values: Mapping[str, Any], where: str, convert: Callable[[Any, Any], Value]
-) -> Entry:  # fmt: skip
+def _entry(kind: type[Entry], values: Mapping[str, Any], where: str, convert: Callable[[Any, Any], Value]) -> Entry:
     wanted, row = COLUMNS[kind], dict[str, Any]()
     for name, value in values.items():
         try:

@@ -130,15 +130,11 @@ class Log:
         rows = [self._row(kind, content, 0, "") for kind, content in self._rows(sql, values)]
         return tuple(Specimen(**{name: getattr(row, name) for name in SPECIMEN_COLUMNS}) for row in rows)
 
-    def readings(
-        self, *, last: int | None = None, superseded: bool = False, **equal: Value
-    ) -> tuple[Reading, ...]:  # fmt: skip
+    def readings(self, *, last: int | None = None, superseded: bool = False, **equal: Value) -> tuple[Reading, ...]:
         """Readings of the multimeter, the earliest first; parameters as :meth:`entries`."""
         return tuple(self.entries(Reading, last=last, superseded=superseded, replaced=False, **equal))
 
-    def recordings(
-        self, *, last: int | None = None, superseded: bool = False, **equal: Value
-    ) -> tuple[BenchRun, ...]:  # fmt: skip
+    def recordings(self, *, last: int | None = None, superseded: bool = False, **equal: Value) -> tuple[BenchRun, ...]:
         """Recordings of the bench, the earliest first; parameters as :meth:`entries`."""
         return tuple(self.entries(BenchRun, last=last, superseded=superseded, replaced=False, **equal))
 

@@ -195,9 +195,7 @@ def bind(
     return [row for row in new if isinstance(row, Print)]
 
 
-def _prints(
-    log: Log, names: Sequence[str], of: Design, on_bed: Print | None, iteration: int | None
-) -> Iterator[Print]:  # fmt: skip
+def _prints(log: Log, names: Sequence[str], of: Design, on_bed: Print | None, iteration: int | None) -> Iterator[Print]:
     """Row of each name that is not bound to a design yet, or to the print on its bed."""
     design_id = on_bed.design_id if on_bed else of.id()
     film_mm = getattr(of.params, "dielectric_mm", None)

@@ -183,9 +183,7 @@ class _LockIn:
         if min(lengths) == 0:
             raise BadInput(f"impedance_data.{name}: no samples")
         clipping = _clipping(tree, k, lockins, settings)
-        return cls(
-            name, tones, parts, time, stamps, min(lengths), max(lengths) - min(lengths), settings, clipping
-        )  # fmt: skip
+        return cls(name, tones, parts, time, stamps, min(lengths), max(lengths) - min(lengths), settings, clipping)
 
     def recording(self, at: slice, source: Source) -> Recording:
         """A stretch of it."""
