@@ -79,10 +79,10 @@ def offset_table():
     with tempfile.TemporaryDirectory() as folder:
         for count in (3, 10, 30, 100):
             found, run = joined_run(Path(folder), made.presses(count), 12.34, 0.0)
-            off = found.offset_s - 12.34 - 0.03
+            off = found.clocks.offset_s - 12.34 - 0.03
             yield (
-                f"| {count} | {run.time_s[-1]:.0f} | {off * 1e3:.2f} | {found.offset_error_s * 1e3:.2f} | "
-                f"{found.explained:.3f} |"
+                f"| {count} | {run.time_s[-1]:.0f} | {off * 1e3:.2f} | {found.clocks.offset_error_s * 1e3:.2f} | "
+                f"{found.clocks.explained:.3f} |"
             )
 
 
@@ -95,7 +95,8 @@ def slow_table():
             found, _ = joined_run(
                 Path(folder), made.presses(12, dwell_s=4.0), 12.34, 0.0, law=made.answering(0.01, tau), ramp_s=ramp
             )
-            yield f"| {tau:g} | {ramp:g} | {(found.offset_s - 12.37) * 1e3:.2f} | {found.offset_error_s * 1e3:.2f} |"
+            off, error = found.clocks.offset_s - 12.37, found.clocks.offset_error_s
+            yield f"| {tau:g} | {ramp:g} | {off * 1e3:.2f} | {error * 1e3:.2f} |"
 
 
 def joined_run(folder, plan, offset_s, skew, **how):

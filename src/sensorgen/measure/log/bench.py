@@ -198,8 +198,8 @@ def _with_rig(before: RigDay | None, first: "Joined", rig: "RigLog") -> RigDay:
     samples = first.recording.counts()["rig error"]
     if before:
         return replace(before, samples=before.samples + samples)
-    numbers: dict[str, Any] = {name: _known(getattr(first, name)) for name in _CLOCK}
-    return RigDay(**rig.counts(), samples=samples, clocks=first.clock_text(), notes=first.notes, **numbers)
+    numbers: dict[str, Any] = {name: _known(getattr(first.clocks, name)) for name in _CLOCK}
+    return RigDay(**rig.counts(), samples=samples, clocks=first.clocks.words(), notes=first.notes, **numbers)
 
 
 def lockin(recording: "Recording") -> LockIn:

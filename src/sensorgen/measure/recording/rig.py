@@ -213,7 +213,7 @@ class Offset:
 
     Attributes
     ----------
-    offset_s, error_s : float
+    offset_s, offset_error_s : float
         To be added to the rig's time to get the recording's, and its standard error [s].
     skew, skew_error : float
         Rate of the recording's clock over the rig's, less 1, and its standard error; 0 unless significant [-].
@@ -226,12 +226,19 @@ class Offset:
     """
 
     offset_s: float
-    error_s: float
+    offset_error_s: float
     skew: float
     skew_error: float
     middle_s: float
     explained: float
     by_chance: bool
+
+    def words(self) -> str:
+        """The offset, for people."""
+        if np.isnan(self.offset_error_s):
+            return f"clocks assumed to agree: no response to the force (it explains {self.explained:.1%} of the signal)"
+        skew = f", skew {self.skew * 1e6:.3g} +- {self.skew_error * 1e6:.2g} ppm" if self.skew else ""
+        return f"rig's clock + {self.offset_s:.4f} +- {self.offset_error_s:.2g} s{skew}"
 
 
 def estimated(recording: Recording, time: Real, rig: RigLog, within_s: float) -> Offset:
@@ -393,14 +400,8 @@ class Joined:
         Measured force, or the set force where none was measured [N]; nan in gaps of the rig's log.
     set_force_n, set_position_mm : (n,) array
         Set force [N] and position [mm]; nan in gaps of the rig's log.
-    offset_s : float
-        To be added to the rig's time to get the recording's real time, in the middle of the run [s].
-    offset_error_s : float
-        Standard error of the offset [s]; nan where it cannot be estimated and the clocks are assumed to agree.
-    skew, skew_error : float
-        Rate of the recording's clock over the rig's, less 1, and its standard error; 0 unless significant [-].
-    explained : float
-        Share of the signal's variance that the force explains at that offset [-].
+    clocks : Offset
+        Of the recording's real time from the rig's.
     notes : tuple of str
         Remarks.
     """
@@ -409,19 +410,8 @@ class Joined:
     force_n: Real
     set_force_n: Real
     set_position_mm: Real
-    offset_s: float
-    offset_error_s: float
-    skew: float
-    skew_error: float
-    explained: float
+    clocks: Offset
     notes: tuple[str, ...] = ()
-
-    def clock_text(self) -> str:
-        """The offset as text."""
-        if np.isnan(self.offset_error_s):
-            return f"clocks assumed to agree: no response to the force (it explains {self.explained:.1%} of the signal)"
-        skew = f", skew {self.skew * 1e6:.3g} +- {self.skew_error * 1e6:.2g} ppm" if self.skew else ""
-        return f"rig's clock + {self.offset_s:.4f} +- {self.offset_error_s:.2g} s{skew}"
 
 
 def joined(recording: Recording, rig: RigLog, within_s: float = np.inf) -> Joined:
@@ -461,7 +451,7 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
                 f"the force explains {best.explained:.1%} of the readings: too little to find the offset of the "
                 "clocks; expected time stamps, or times of both files that count from the same moment"
             )
-        best = replace(best, offset_s=0.0, error_s=np.nan, skew=0.0, skew_error=np.nan)
+        best = replace(best, offset_s=0.0, offset_error_s=np.nan, skew=0.0, skew_error=np.nan)
     return tuple(_joined(one, rig, time, best) for one, time in zip(recordings, times, strict=True))
 
 
@@ -476,7 +466,7 @@ def _best(recordings: Sequence[Recording], times: Sequence[Real], rig: RigLog, w
             faults.append(error)
     if not offsets:
         raise faults[0]
-    return min(offsets, key=lambda offset: (offset.by_chance, offset.error_s))
+    return min(offsets, key=lambda offset: (offset.by_chance, offset.offset_error_s))
 
 
 def _overlap(time: Real, rig: RigLog) -> bool:
@@ -509,6 +499,5 @@ def _joined(recording: Recording, rig: RigLog, time: Real, offset: Offset) -> Jo
         notes.append(f"{np.count_nonzero(silent)} samples while the rig was silent")
     return Joined(
         replace(recording, marks=marks), np.interp(at, rows, force) * mask, set_force[last] * mask,
-        position[last] * mask, offset.offset_s, offset.error_s, offset.skew, offset.skew_error,
-        offset.explained, tuple(notes),
+        position[last] * mask, offset, tuple(notes),
     )  # fmt: skip

@@ -104,7 +104,7 @@ def _beside(recording: Recording, rig: RigLog | Joined | None) -> tuple[Recordin
         unknown = np.full(len(recording.time_s), np.nan)
         return recording, unknown, unknown, notes
     beside = joined(recording, rig) if isinstance(rig, RigLog) else rig
-    notes += [beside.clock_text(), *beside.notes]
+    notes += [beside.clocks.words(), *beside.notes]
     return beside.recording, beside.force_n, beside.set_position_mm, notes
 
 
