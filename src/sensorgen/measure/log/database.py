@@ -137,7 +137,7 @@ def to_records(connection: sqlite3.Connection, version: int) -> None:
 
 def _rows(connection: sqlite3.Connection, table: str) -> Iterator[tuple[str, str, str]]:
     """Time, table and content of the rows of a table."""
-    joined = "NATURAL JOIN specimen" if "specimen" in entries.columns(entries.KINDS[table]) else ""
+    joined = "NATURAL JOIN specimen" if "specimen" in entries.COLUMNS[entries.KINDS[table]] else ""
     cursor = connection.cursor()
     cursor.row_factory = sqlite3.Row
     for row in cursor.execute(f"SELECT * FROM {table} {joined} ORDER BY number"):  # noqa: S608
@@ -147,7 +147,7 @@ def _rows(connection: sqlite3.Connection, table: str) -> Iterator[tuple[str, str
 def _content(table: str, row: Any) -> str:
     kind = entries.KINDS[table]
     parts = []
-    for name, annotation in entries.columns(kind).items():
+    for name, annotation in entries.COLUMNS[kind].items():
         if name not in row.keys() or name in ("number", "logged_at") or row[name] is None:  # noqa: SIM118 - sqlite3.Row
             continue
         value: object = row[name]

@@ -33,7 +33,7 @@ _LATER_COLUMNS: dict[type[Entry], tuple[str, ...]] = {  # that exports of earlie
     Reading: ("quantity", "value", "frequency_hz", "uncertainty", "wires", "temperature_c", "humidity_percent",
               "photo", "file", "defects"),
 }  # fmt: skip
-COLUMNS = {kind: {k: v for k, v in entries.columns(kind).items() if k != "number"} for kind in ROWS}
+COLUMNS = {kind: {k: v for k, v in entries.COLUMNS[kind].items() if k != "number"} for kind in ROWS}
 """Columns of each exported table with their types: all fields but the row's number in its own log."""
 
 

@@ -17,6 +17,7 @@ from sensorgen.measure.log import chain, database, files
 from sensorgen.measure.log.chain import Record
 from sensorgen.measure.log.database import Appender
 from sensorgen.measure.log.entries import (
+    COLUMNS,
     INDEXED,
     KINDS,
     NAMES,
@@ -36,7 +37,6 @@ from sensorgen.measure.log.entries import (
     Specimen,
     Value,
     Withdrawal,
-    columns,
     decode,
     indexed,
     word,
@@ -181,8 +181,8 @@ class Log:
         BadInput
             The log is damaged; rows given before are sound.
         """
-        if strange := equal.keys() - columns(kind).keys():
-            raise UnknownName(f"column of a {kind.__name__}", min(strange), columns(kind))
+        if strange := equal.keys() - COLUMNS[kind].keys():
+            raise UnknownName(f"column of a {kind.__name__}", min(strange), COLUMNS[kind])
         asked = {name: equal[name] for name in (*INDEXED, "number") if equal.get(name) not in ("", None)}
         where = " AND ".join((*(f"{name} = ?" for name in asked), _current(superseded=superseded, replaced=replaced)))
         sql = (
@@ -583,7 +583,7 @@ def _two_designs(one: Print, other: Print) -> str:
 def _same(one: Entry, other: Entry, but: tuple[str, ...]) -> bool:
     """Test whether two rows of a kind have the same content, apart from some fields."""
     return type(one) is type(other) and all(
-        getattr(one, name) == getattr(other, name) for name in columns(type(one)) if name not in but
+        getattr(one, name) == getattr(other, name) for name in COLUMNS[type(one)] if name not in but
     )
 
 
