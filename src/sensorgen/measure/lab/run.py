@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from sensorgen.core.arrays import Real
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.core.version import __version__
@@ -31,6 +30,8 @@ Confirm = Callable[["PlannedRun", dict[str, Identity]], bool]
 """Whether the rig may move, by what is planned and what each device said that it is."""
 WATCHDOG_S = 1.5  # without a reading, until the actuator's controller lifts
 UNWATCHED_N = 1.0  # highest limits.force_n without that: the weight of the piston alone is 0.9 N
+_PLANNED = ("place_mm", "force_n", "peak_n", "hold_s")  # of a press that was done, in the journal
+_MEASURED = ("before_ohm", "pressed_ohm", "noise")
 USUAL_MM = 100.0  # length of a specimen whose design is unknown
 
 
@@ -338,7 +339,7 @@ class _Attempt:
                 loop.pausable = False
             self.done.add(step.number)
             loop.recorder.journal.note("done", step=step.number, **_kept(pressed))
-            if all(np.isfinite(values).all() for values in (pressed.before_ohm, pressed.pressed_ohm, pressed.noise)):
+            if all(np.isfinite(getattr(pressed, name)).all() for name in _MEASURED):
                 self.pressed.append(pressed)
             return True
 
@@ -403,18 +404,10 @@ def _beside(loop: Loop, choose: Callable[[], Choice]) -> Choice:
 
 
 def _kept(pressed: DonePress) -> dict[str, Any]:
-    """Part of a press that the journal keeps."""
-    step = pressed.step
-    return {
-        "place_mm": step.place_mm, "force_n": step.force_n, "peak_n": step.peak_n, "hold_s": step.hold_s,
-        "noise": _numbers(pressed.noise),
-        **{name: _numbers(getattr(pressed, name).view(float)) for name in ("before_ohm", "pressed_ohm")},
-    }  # fmt: skip
-
-
-def _numbers(values: Real) -> list[float] | None:
-    """For JSON, which has no nan."""
-    return values.tolist() if np.isfinite(values).all() else None
+    """Part of a press that the journal keeps; null for numbers of which some are nan, which JSON has not."""
+    values = {name: getattr(pressed, name).view(float) for name in _MEASURED}
+    known = {name: each.tolist() if np.isfinite(each).all() else None for name, each in values.items()}
+    return {name: getattr(pressed.step, name) for name in _PLANNED} | known
 
 
 def _pressed(before: RunFolder, steps: Sequence[PlannedPress]) -> list[DonePress]:
@@ -423,8 +416,8 @@ def _pressed(before: RunFolder, steps: Sequence[PlannedPress]) -> list[DonePress
     presses = []
     for event in before.of("done"):
         step = by_number.get(event["step"])
-        if step and all(event[name] for name in ("before_ohm", "pressed_ohm", "noise")):
-            values = {name: event[name] for name in ("place_mm", "force_n", "peak_n", "hold_s")}
+        if step and all(event[name] for name in _MEASURED):
+            values = {name: event[name] for name in _PLANNED}
             at_rest, after = (np.array(event[name]).view(complex) for name in ("before_ohm", "pressed_ohm"))
             presses.append(DonePress(replace(step, **values), at_rest, after, np.array(event["noise"])))
     return presses
