@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,10 +11,12 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
 from sensorgen.measure.input_file import checked_head
-from sensorgen.measure.readings import Readings, readings
 from sensorgen.measure.recording import samples
 from sensorgen.measure.recording.samples import MOST_TONES, MOST_VALUES, Recording, Source
 from sensorgen.measure.recording.spool import MOST_BYTES, FileSpool
+
+if TYPE_CHECKING:
+    from sensorgen.measure.readings import Readings
 
 TIME, STAMP, CLIPPED, VALID = "time_s", "stamp_s", "clipped", "valid"
 
@@ -34,6 +37,8 @@ def recordings(path: Path, columns: Mapping[str, str]) -> Iterator[tuple[Recordi
     BadInput
         As :func:`sensorgen.measure.readings.readings`; no time, or a time that does not rise.
     """
+    from sensorgen.measure.readings import readings
+
     with readings(str(path), columns, (TIME, STAMP, CLIPPED, VALID)) as file:
         if not {TIME, STAMP} & set(file.numbers):
             message = f"no column {TIME} and none {STAMP} (seconds since 1970); name it with a map of columns"
@@ -51,7 +56,7 @@ def recordings(path: Path, columns: Mapping[str, str]) -> Iterator[tuple[Recordi
             yield (_stretch(path, file, blocks),)
 
 
-def _stretch(path: Path, file: Readings, blocks: list[tuple[Complex, Real]]) -> Recording:
+def _stretch(path: Path, file: "Readings", blocks: list[tuple[Complex, Real]]) -> Recording:
     impedance = np.concatenate([z for z, _ in blocks])
     beside = dict(zip(file.numbers, np.concatenate([numbers for _, numbers in blocks]).T, strict=True))
     blocks.clear()
