@@ -42,7 +42,7 @@ def whole(file, jobs=2):
     found = search(target, candidates(target), Workers(jobs))
     yield f"{len(found.rows)} designs, {len(found.evaluated)} evaluated: {cpu_s() - begun:.0f} s of CPU, "
     yield f"{time.perf_counter() - wall:.0f} s of wall"
-    yield from (f"{count} {why} ({'certified' if proof else 'by the models'})" for why, proof, count in found.reasons())
+    yield from (f"{r.count} {r.why} ({'certified' if r.certified else 'by the models'})" for r in found.reasons())
     for row in found.front:
         numbers = row.trial.printed
         yield f"{row.values}: {numbers.force_resolution.words()}, {numbers.position_resolution.words()}"

@@ -313,9 +313,9 @@ def pictures(run, pairs):
         "synthetic run of known truth", made.TONES_HZ, one.time_s[valid], one.impedance_ohm[valid],
         *lowpass.filtered(one), pairs,
     )  # fmt: skip
-    (PICTURES / "recordings-time.png").write_bytes(plots.over_time(shown))
+    (PICTURES / "recordings-time.png").write_bytes(static.png(plots.series(shown)))
     for part in plots.PARTS:
-        (PICTURES / f"recordings-{part}.png").write_bytes(plots.surfaces(shown, part))
+        (PICTURES / f"recordings-{part}.png").write_bytes(static.png(plots.differences(shown, part)))
     sets = {}
     for seed in range(4):
         plan = made.presses(40, seed=seed)
@@ -325,7 +325,7 @@ def pictures(run, pairs):
         sets[f"print {seed + 1}"] = presses.pairs(
             other.time_s, other.impedance_ohm, every, at, other.force_n, other.position_mm
         )
-    (PICTURES / "recordings-normalised.png").write_bytes(plots.normalised_differences(sets, made.TONES_HZ))
+    (PICTURES / "recordings-normalised.png").write_bytes(static.png(plots.compared(sets, made.TONES_HZ)))
 
 
 def ways_picture():

@@ -54,7 +54,7 @@ def bounds_on_a_sheet() -> None:
     ports = contact_sets(film)
     tones = np.array(TONES_HZ)
     bounds = {name: localise(film, pairs, tones, press, per_newton, places=7) for name, pairs in ports.items()}
-    (PICTURES / "sheet-bounds.png").write_bytes(results.sheet_png(film, bounds, ports))
+    (PICTURES / "sheet-bounds.png").write_bytes(static.png(results.sheet(film, bounds, ports)))
 
 
 def touch() -> None:

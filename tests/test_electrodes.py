@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from sensorgen.analysis.comparison.allowed import _per_resistivity
+from sensorgen.analysis.comparison.specimens import _per_resistivity
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body, Cells
 from sensorgen.design.design import make

@@ -13,8 +13,8 @@ from drawn_sensor import sensor_of
 from scipy import stats
 
 from no_numbers import roughly_at_rest
-from sensorgen.analysis.comparison.allowed import AllowedValues
 from sensorgen.analysis.comparison.expected import Movable
+from sensorgen.analysis.comparison.specimens import AllowedValues
 from sensorgen.analysis.fit import Fit, Fitted, Untold, fit, text
 from sensorgen.analysis.fit.estimates import OfSpecimen, _together, leak, resistivity, values
 from sensorgen.analysis.fit.fitting import held_back

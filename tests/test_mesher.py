@@ -4,12 +4,15 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+import shapely
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import make
+from sensorgen.prediction import bodies
 from sensorgen.prediction.mesh_ladder import drawn
+from sensorgen.prediction.sensor_model import piece
 from sensorgen.solvers.contact import mesher
-from sensorgen.solvers.contact.cell import cell_of
+from sensorgen.solvers.contact.cell import cell_of, joined
 from sensorgen.solvers.contact.mesh import Fineness, mesh_of
 
 pytestmark = pytest.mark.skipif(find_spec("netgen") is None, reason="needs NGSolve")
@@ -67,6 +70,22 @@ def meshed(count):
 
 def test_thin_electrodes_end_no_process():
     assert len(meshed(6)) == 6
+
+
+def test_straight_edges_become_one_and_nothing_moves():
+    """Outlines by shapely: the printed cell's regions stay, its cuts in straight edges go."""
+    printed = piece(bodies.estimated(make({"shape": "tri", "parameters": {"length_mm": 8.0}})))
+    cut = cell_of(printed.scene, printed.period_mm)
+    whole = joined(cut.edges)
+    assert len(whole) < 0.7 * len(cut.edges)
+    for region in range(1, len(cut.regions) + 1):
+        before, after = (
+            shapely.MultiLineString([edge for edge, sides in edges.items() if region in sides])
+            for edges in (cut.edges, whole)
+        )
+        assert after.length == pytest.approx(before.length)
+        assert after.hausdorff_distance(before) < 1e-9
+        assert shapely.polygonize([after]).area == pytest.approx(shapely.polygonize([before]).area)
 
 
 @pytest.mark.nightly

@@ -5,9 +5,10 @@ from math import cos, pi, sin, tau
 
 import numpy as np
 import pytest
+import shapely
 from manifold3d import CrossSection, FillRule
 
-from sensorgen.scene.layers import overlay_parts
+from sensorgen.scene.layers import inside, overlay_parts
 from sensorgen.scene.scene import Body, Outline, Prism, Scene, area_mm2, box, rectangle, rounded
 
 SIZE = (4.0, 3.0)
@@ -148,3 +149,14 @@ def test_what_has_no_plan_is_refused(bodies, said):
 def test_bodies_that_touch_do_not_overlap():
     touching = [upright("a", regular(8, 1.0), 0.3, 0.9), upright("b", regular(5, 0.5), 0.9, 1.2)]
     assert len(areas(scene(*touching))) == 3
+
+
+def test_places_of_a_grid_are_inside_as_shapely_says_of_each():
+    random = np.random.default_rng(5)
+    discs = [shapely.Point(*at).buffer(r, quad_segs=3) for *at, r in random.uniform(0, [10, 5, 0.8], (80, 3))]
+    region = shapely.union_all(discs[:40]) - shapely.union_all(discs[40:])
+    x, y = np.sort(random.uniform(-1, 11, 90)), np.sort(random.uniform(-1, 6, 60))
+    expected = shapely.contains_xy(region, *np.meshgrid(x, y, indexing="ij"))
+    assert np.array_equal(inside(region, x, y), expected)
+    assert 0.05 < expected.mean() < 0.95
+    assert not inside(shapely.Polygon(), x, y).any()

@@ -137,7 +137,14 @@ def test_what_makes_no_picture(sensor, axes, said):
 
 @pytest.mark.parametrize(
     ("largest", "divisor", "unit"),
-    [(999.0, 1.0, "Ω"), (1000.0, 1e3, "kΩ"), (2e6, 1e6, "MΩ"), (0.5, 1e-3, "mΩ"), (0.0, 1.0, "Ω"), (1e-30, 1e-9, "nΩ")],
+    [
+        (999.0, 1.0, "Ω"),
+        (1000.0, 1e3, "kΩ"),
+        (2e6, 1e6, "MΩ"),
+        (0.5, 1e-3, "mΩ"),
+        (0.0, 1.0, "Ω"),
+        (1e-30, 1e-15, "fΩ"),
+    ],
 )
 def test_scale(largest, divisor, unit):
     assert scale(np.array([0.0, -largest]), "Ω") == (divisor, unit)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sensorgen.analysis.plots import recordings as bench
+from sensorgen.analysis.plots import static
 from sensorgen.analysis.plots.figure import thinned
 from sensorgen.measure.recording import Recording, RecordingClock, Source
 from sensorgen.measure.recording.samples import blank
@@ -46,15 +47,15 @@ def test_decimated_curves_keep_their_spikes_and_ends():
 
 
 def test_pictures_are_drawn_and_the_same_every_time(run):
-    for draw in (bench.over_time, lambda r: bench.surfaces(r, "reactance")):
-        first = draw(run)
+    for figure in (bench.series(run), bench.differences(run, "reactance")):
+        first = static.png(figure)
         assert first.startswith(b"\x89PNG")
         assert len(first) > 20_000
-    assert bench.surfaces(run, "reactance") == first
+    assert static.png(bench.differences(run, "reactance")) == first
     sets = {"$a$ $\\frac$": run.pairs, "b": run.pairs}
-    assert bench.normalised_differences(sets, run.tones_hz).startswith(b"\x89PNG")
+    assert static.png(bench.compared(sets, run.tones_hz)).startswith(b"\x89PNG")
     plan = RunPlan(1, 20, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0)
-    assert bench.schedule(plan.steps(), plan.seconds()).startswith(b"\x89PNG")
+    assert static.png(bench.schedule(plan.steps(), plan.seconds())).startswith(b"\x89PNG")
 
 
 def test_a_surface_goes_through_its_presses(run):

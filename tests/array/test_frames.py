@@ -7,6 +7,7 @@ import pytest
 from array_network import by_currents
 
 from sensorgen.analysis.plots import array as plots
+from sensorgen.analysis.plots import static
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
@@ -129,7 +130,7 @@ def test_what_is_not_read_is_not_no_pressure(model):
     broken = maps(model, readout, simulated(model, readout, pressure, faults=["r2:3"]))
     assert np.isnan(broken.pressure_kpa[:, 1, 3:]).all()
     assert np.isnan(broken.pressure_kpa).sum() == 2 * 3
-    assert plots.maps(broken, PRESSURE)[:4] == b"\x89PNG"
+    assert static.png(plots.figure(broken, PRESSURE))[:4] == b"\x89PNG"
 
 
 def test_force_and_centre_count_lost_crossings_by_those_around(model):
@@ -281,7 +282,7 @@ def test_a_table_has_its_frequency_and_day_and_no_time_is_no_number(tmp_path, mo
     untimed = inverted(model, readout, frames_of(model, readout), np.arange(5) < 3, np.full(5, np.nan))
     assert "no time_s: times of the frames are not known" in "\n".join(document.text(untimed.document()))
     assert untimed.table().cells[0][0] is None
-    assert plots.maps(untimed)[:4] == b"\x89PNG"
+    assert static.png(plots.figure(untimed))[:4] == b"\x89PNG"
 
 
 def test_a_file_at_rest_gives_what_it_marks_and_its_own_frequency(tmp_path):

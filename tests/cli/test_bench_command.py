@@ -126,7 +126,9 @@ def test_a_recording_of_the_log_by_its_number_with_tables_and_pictures(run, file
     back = run("invert", "tri", "--perfect", "p.csv")
     assert (back.code, back.err) == (0, "")
     assert f"{len(MADE)} " in back.out
-    assert (tmp_path / "p.csv").read_text().splitlines()[0].startswith("time_s,rest,force_n,position_mm,re_ohm_")
+    head, at_rest, *_ = (tmp_path / "p.csv").read_text().splitlines()
+    assert head.startswith("time_s,rest,force_n,position_mm,re_ohm_")
+    assert at_rest.split(",")[1:4] == ["1.0", "", ""]
     by_ratio = run("invert", "tri", "p.csv", "--drawn", "-o", "back.csv")
     assert (by_ratio.code, by_ratio.err) == (0, "")
     statuses = [row["status"] for row in csv.DictReader((tmp_path / "back.csv").read_text().splitlines())]

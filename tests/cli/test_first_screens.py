@@ -26,6 +26,11 @@ def test_first_screens_fit_a_terminal(run):
     assert (said.code, fits(said.out)) == (1, True)
     assert said.out.splitlines()[-1].startswith("out/trix-d0.2: ")
     assert fits(run("predict", "tri", "--dielectric", "0.2").out)
+    presses = ("predict", "tri", "--dielectric", "0.2", "--force", "0:6:1", "--position", "0:100:10")
+    loaded = run(*presses).out
+    assert fits(loaded)
+    assert "this design" in loaded
+    assert len(run(*presses, "--details").out.splitlines()) > 60
     assert len(run("predict", "tri", "--dielectric", "0.2", "--details").out.splitlines()) > 60
 
 

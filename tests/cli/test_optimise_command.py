@@ -21,12 +21,11 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import Query
 from sensorgen.workflows.optimise import front, ladder, recommend, result
-from sensorgen.workflows.optimise.front import Front, search
+from sensorgen.workflows.optimise.front import Front, Reason, search, settled
 from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended
 from sensorgen.workflows.optimise.sample import _objectives, sample
 from sensorgen.workflows.optimise.space import MOST, candidates, space
 from sensorgen.workflows.optimise.target import Target, load
-from sensorgen.workflows.optimise.ties import settled
 from sensorgen.workflows.search import Candidate, EarlyNumber
 from sensorgen.workflows.templates import new
 
@@ -115,7 +114,9 @@ def test_sensitivity_on_the_coarse_mesh_is_that_of_a_bonded_plate():
 def test_limits_are_proven_before_anything_is_evaluated():
     search_ = found(limits={"capacitance_pf": {"most": 150}})
     assert {row.values["dielectric_mm"] for row in search_.evaluated} <= {0.3, 0.4}
-    assert [r for r in search_.reasons() if r[0] == "limit capacitance_pf"] == [("limit capacitance_pf", True, 6)]
+    assert [r for r in search_.reasons() if r.why == "limit capacitance_pf"] == [
+        Reason("limit capacitance_pf", True, 6)
+    ]
 
 
 def test_a_target_that_nothing_meets_names_the_nearest_and_what_binds():
@@ -230,10 +231,10 @@ def test_a_length_in_the_plane_is_varied_in_half_lines():
 
 def test_a_design_that_cannot_be_made_has_its_reason():
     search_ = found(parameters={"dielectric_mm": {"from": -0.2, "to": 0.2}})
-    (why,) = [r for r in search_.reasons() if r[0].startswith("cannot be made")]
-    assert why[1:] == (True, 2)
-    assert "dielectric_mm" in why[0]
-    assert "-0.2" in why[0]
+    (why,) = [r for r in search_.reasons() if r.why.startswith("cannot be made")]
+    assert (why.certified, why.count) == (True, 2)
+    assert "dielectric_mm" in why.why
+    assert "-0.2" in why.why
 
 
 def test_an_accepted_doubt_that_nothing_has_is_named():
@@ -270,6 +271,27 @@ def planted(plate, numbers, objectives):
     search_.rows = rows
     search_.front = tuple(rows)
     return search_
+
+
+def test_reasons_and_constraints_are_counted():
+    """Reasons that differ in numbers are one; an evaluation proves nothing; who violates most alone comes first."""
+    search_ = planted((None, None), (), FORCE)
+    search_.rows = [
+        Candidate({}, number=1, violated={"limit a": 1.0, "limit b": 1.0}),
+        Candidate({}, number=2, violated={"limit a": 1.0}),
+        *(
+            Candidate({}, number=k, discarded=f"violates doubt {k}.5", certified=False, violated={"doubt": 1.0})
+            for k in (3, 4, 5)
+        ),
+        Candidate({}, number=6, discarded="limit c", violated={"limit c": 1.0}),
+    ]
+    assert search_.reasons() == [
+        Reason("violates doubt 3.5", False, 3), Reason("violates limit a", False, 2), Reason("limit c", True, 1),
+    ]  # fmt: skip
+    assert [vars(row) for row in search_.binding()] == [
+        {"constraint": "doubt", "violated": 3, "alone": 3}, {"constraint": "limit a", "violated": 2, "alone": 1},
+        {"constraint": "limit c", "violated": 1, "alone": 1}, {"constraint": "limit b", "violated": 1, "alone": 0},
+    ]  # fmt: skip
 
 
 FORCE = {"force_resolution_n": "minimise"}

@@ -204,6 +204,11 @@ def test_prints_that_all_broke_do_not_vouch_for_each_other(run, tmp_path, path, 
     assert verdicts(run, tmp_path, path, [(100, 2e6), (100, 2e6), (100, 2e6)]) == ["open electrode"] * 3
 
 
+def test_a_sound_print_is_not_judged_by_broken_ones(run, tmp_path, path, shared_cache):
+    """280 ohm by rho l / (w t) beside two broken tracks: no k was lost."""
+    assert verdicts(run, tmp_path, path, [(20, 280), (20, 2e6), (20, 3e6)]) == ["intact", *["open electrode"] * 2]
+
+
 def test_a_long_print_is_not_judged_by_short_ones(run, tmp_path, path, shared_cache):
     ohm = {length: 0.042 * length * 1e-3 / (10e-3 * 0.3e-3) for length in (20, 100)}
     readings = [(20, 1.5 * ohm[20]), (20, 1.4 * ohm[20]), (20, 1.6 * ohm[20]), (100, 1.5 * ohm[100])]

@@ -6,12 +6,12 @@ import pytest
 from line_cases import PLATE
 
 from sensorgen.models import line
-from sensorgen.verification.peers import line as programs
+from sensorgen.verification import line_models
 
 
 def through_scikit_rf(inputs) -> complex:
     pytest.importorskip("skrf", reason="scikit-rf is not installed")
-    return complex(programs.scikit_rf(line.PressedLine(**inputs))[0])
+    return complex(line_models.scikit_rf(line.PressedLine(**inputs))[0])
 
 
 @pytest.mark.filterwarnings("default")
@@ -35,7 +35,7 @@ def test_scikit_rf_dies_towards_low_frequency():
 def test_ngspice_solves_the_same_ladder(f, program):
     program("ngspice", "ngspice")
     given = line.PressedLine(**PLATE | {"frequency_hz": np.array([f])})
-    (theirs,) = programs.ngspice(given, 100)
+    (theirs,) = line_models.ngspice(given, 100)
     assert theirs == pytest.approx(complex(line_ladder.impedance(given, 100)[0]), rel=1e-8)
     z = complex(line.impedance(given)[0])
     assert abs(theirs - z) < 1e-4 * abs(z)

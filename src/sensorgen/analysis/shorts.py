@@ -16,12 +16,12 @@ from functools import cache
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from sensorgen.analysis.plots.figure import ORANGE, Axis, Curve, Figure, Map, Panel
 from sensorgen.asprinted.beads import beads
 from sensorgen.asprinted.pinholes import CoveredFilm, Pinholes, draws, films, opened, pinholes, through
 from sensorgen.asprinted.registration import placed
+from sensorgen.core.arrays import Real
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design
@@ -176,7 +176,7 @@ def series() -> Counts:
     return {key: (shorted[key], total) for key, total in every.items()}
 
 
-def elsewhere(shape: str, layers: Sequence[int], counts: Counts | None = None) -> NDArray[np.float64]:
+def elsewhere(shape: str, layers: Sequence[int], counts: Counts | None = None) -> Real:
     r"""Probability that a print is shorted by anything but holes: values of equal probability after earlier prints.
 
     .. math:: r = p^{n^g}, \quad p \sim \mathrm{Beta}(m k, (1 - m) k)
@@ -207,17 +207,11 @@ def elsewhere(shape: str, layers: Sequence[int], counts: Counts | None = None) -
     return _quantiles(1 - sound, np.exp(weight - weight.max()), (np.arange(_GRID) + 0.5) / _GRID)
 
 
-def _quantiles(
-    values: NDArray[np.float64], weight: NDArray[np.float64], shares: Sequence[float] | NDArray[np.float64]
-) -> NDArray[np.float64]:
-    order = np.argsort(values)
-    below = np.cumsum(weight[order])
-    return np.asarray(values[order][np.searchsorted(below / below[-1], shares)])
+def _quantiles(values: Real, weight: Real, shares: Sequence[float] | Real) -> Real:
+    return np.quantile(values, shares, weights=weight, method="inverted_cdf")
 
 
-def chance(
-    holes: Sequence[float] | NDArray[np.float64], other: NDArray[np.float64], shorted: int, prints: int
-) -> Chance:
+def chance(holes: Sequence[float] | Real, other: Real, shorted: int, prints: int) -> Chance:
     """Posterior of the probability that a print is shorted.
 
     Parameters

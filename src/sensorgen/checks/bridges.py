@@ -13,7 +13,7 @@ from sensorgen.checks.widths import TOUCH_MM, VANISHES, Slices
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality
-from sensorgen.scene.layers import LayerRegions, Region, cleaned, is_rectilinear, narrow_mm, parts
+from sensorgen.scene.layers import LayerRegions, Region, cleaned, inside, is_rectilinear, narrow_mm, parts
 from sensorgen.scene.scene import SLIVER_MM, Body
 
 
@@ -75,10 +75,9 @@ def _grid(
         x, y = (at[np.diff(at, prepend=-np.inf) > SLIVER_MM] for at in (x, y))
     else:
         x, y = (np.linspace(at[0], at[-1], ceil((at[-1] - at[0]) / step_mm) + 1) for at in (x, y))
-    middles = np.meshgrid((x[:-1] + x[1:]) / 2, (y[:-1] + y[1:]) / 2, indexing="ij")
-    shapely.prepare([shape, *ground])
-    below = np.any([shapely.contains_xy(region, *middles) for region in ground], axis=0)
-    return (x, y), shapely.contains_xy(shape, *middles), below
+    middles = (x[:-1] + x[1:]) / 2, (y[:-1] + y[1:]) / 2
+    below = np.any([inside(region, *middles) for region in ground], axis=0)
+    return (x, y), inside(shape, *middles), below
 
 
 def _spans(shape: Region, ground: Sequence[Region], least_mm: float) -> dict[str, _Span]:

@@ -63,9 +63,9 @@ COMMANDS = tuple(name for commands in SECTIONS.values() for name in commands)
 _MODULES = {  # of commands, where it is not ``cli/NAME_command.py``
     "chart": "verification.chart_command",
     "thesis": "verification.thesis_command",
-    **dict.fromkeys(("check", "build", "slice"), "cli.printing"),
+    **dict.fromkeys(("check", "build", "slice", "optimise"), "cli.printing"),
     **dict.fromkeys(("predict", "cell", "compress"), "cli.predictions"),
-    **dict.fromkeys(("calibrate", "fit", "characterise"), "cli.fitting"),
+    **dict.fromkeys(("calibrate", "fit", "characterise", "report"), "cli.fitting"),
     **dict.fromkeys(("show", "draw", "export", "import"), "cli.views"),
     **dict.fromkeys(("array", "sheet", "stack"), "cli.studies"),
     **dict.fromkeys(("new", "pack", "list", "schema", "completion"), "cli.reference"),

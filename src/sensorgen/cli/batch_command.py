@@ -15,49 +15,42 @@ from sensorgen.export.slicers import TIME_LIMIT_S
 Jobs = Annotated[int, Option(kind=click.IntRange(1, 64), typed="")]
 
 
-class _PlanGroup(FirstWord):
-    """A command whose first word is a plan's file, or ``verify``."""
+def _plan(
+    name: str, *, out: Out = Path("out"), no_gcode: bool = False, time_limit_s: TimeLimit = TIME_LIMIT_S,
+    force: bool = False, strict: Strict = False, jobs: Jobs = 1, cluster: Cluster = "",
+) -> int:  # fmt: skip
+    """Write all files of a plan's plate.
 
-    thing, form = "plan", "PLAN.yaml {option} ..."
+    Parameters
+    ----------
+    out
+        Folder for batches' folders.
+    no_gcode
+        Leave out slicing, which takes most of the time.
+    force
+        Write the files even if checks report errors.
+    jobs : N
+        Processes at once; one if not given.
+    """
+    from sensorgen.workflows.batch import STEPS, make
 
-    def of(self, name: str) -> click.Command:
-        """The command for a plan."""
-
-        @of_function(name, *render.options(folder=True))
-        def plan(
-            *, out: Out = Path("out"), no_gcode: bool = False, time_limit_s: TimeLimit = TIME_LIMIT_S,
-            force: bool = False, strict: Strict = False, jobs: Jobs = 1, cluster: Cluster = "",
-        ) -> int:  # fmt: skip
-            """Write all files of a plan's plate.
-
-            Parameters
-            ----------
-            out
-                Folder for batches' folders.
-            no_gcode
-                Leave out slicing, which takes most of the time.
-            force
-                Write the files even if checks report errors.
-            jobs : N
-                Processes at once; one if not given.
-            """
-            from sensorgen.workflows.batch import STEPS, make
-
-            with LogFile().existing() as log:
-                head = log.head()[1] if log else ""
-            with render.refused(Path(name).stem), render.progress(STEPS) as step:
-                batch = make(
-                    Path(name), out, gcode=not no_gcode, time_limit_s=time_limit_s, force=force, strict=strict,
-                    log_head=head, jobs=jobs, cluster=cluster, step=step,
-                )  # fmt: skip
-            render.deliver(batch)
-            return FOUND_ERRORS if batch.errors(force=force) else 0
-
-        return plan
+    with LogFile().existing() as log:
+        head = log.head()[1] if log else ""
+    with render.refused(Path(name).stem), render.progress(STEPS) as step:
+        batch = make(
+            Path(name), out, gcode=not no_gcode, time_limit_s=time_limit_s, force=force, strict=strict,
+            log_head=head, jobs=jobs, cluster=cluster, step=step,
+        )  # fmt: skip
+    render.deliver(batch)
+    return FOUND_ERRORS if batch.errors(force=force) else 0
 
 
-command = _PlanGroup(
+command = FirstWord(
     "batch",
+    _plan,
+    *render.options(folder=True),
+    thing="plan",
+    form="PLAN.yaml {option} ...",
     subcommand_metavar="{PLAN.yaml|verify} [OPTIONS]",
     help="""Put several sensors on one plate: 3MF, G-code, labels, and a record of what lies where.
 

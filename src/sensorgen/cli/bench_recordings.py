@@ -1,8 +1,7 @@
 """``sensorgen bench show|hysteresis|sets|live``: recordings from files, or by their number in the log."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -187,21 +186,16 @@ def _in_turn(two: "NDArray[Any]") -> "NDArray[Any]":
 
 def _csv(names: tuple[str, ...], beside: "Sequence[Real]", tones_hz: "Real", z: "Complex") -> bytes:
     """Columns, then two for each tone; empty where nothing is known."""
-    import io
-
     import numpy as np
 
     heads = [f"{part}_ohm_{units.frequency_text(float(f))}" for f in tones_hz for part in ("re", "im")]
     values = np.column_stack([*beside, np.stack([z.real, z.imag], axis=-1).reshape(len(z), -1)])
-    text = io.StringIO()
-    np.savetxt(text, values, "%.12g", ",", header=",".join([*names, *heads]), comments="")
-    return text.getvalue().replace("nan", "").encode()
+    return render.columns([*names, *heads], values.tolist()).encode()
 
 
 def _drawn(processed: "Processed", name: str, folder: Path) -> list[str]:
     """Pictures, and the page; surfaces only where presses span one."""
-    from sensorgen.analysis.plots import recordings
-    from sensorgen.core import files as store
+    from sensorgen.analysis.plots import recordings, static
 
     if processed.pairs is None:
         raise BadInput(f"--plot {folder}: {processed.notes[-1]}")
@@ -214,13 +208,13 @@ def _drawn(processed: "Processed", name: str, folder: Path) -> list[str]:
     run = recordings.DrawnRecording(
         name, one.tones_hz, one.time_s[valid], raw, processed.filtered_s, smooth, processed.pairs
     )
-    files: dict[str, Callable[[recordings.DrawnRecording], bytes]] = {"time.png": recordings.over_time}
+    figures = [recordings.series(run)]
     if processed.by_force:
-        files |= {f"{part}.png": partial(recordings.surfaces, part=part) for part in recordings.PARTS}
-        files["run.html"] = lambda of: recordings.html(of).encode()
-    for file, draw in files.items():
-        store.replace(folder / file, draw(run))
-    return [str(folder / file) for file in files]
+        figures += [recordings.differences(run, part) for part in recordings.PARTS]
+    files = {f"{figure.key}.png": static.png(figure) for figure in figures}
+    if processed.by_force:
+        files["run.html"] = recordings.html(run).encode()
+    return render.written(folder, files.items())
 
 
 _LAW = "smooth"
@@ -302,9 +296,9 @@ def _sets(
     if output:
         files.replace(output, _table(sets, tones, together=together))
     if plot:
-        from sensorgen.analysis.plots import recordings
+        from sensorgen.analysis.plots import recordings, static
 
-        files.replace(plot, recordings.normalised_differences(sets, tones, together=together))
+        files.replace(plot, static.png(recordings.compared(sets, tones, together=together)))
     return of_sets(tones, sets, [str(name) for name in (output, plot) if name])
 
 
@@ -328,9 +322,6 @@ def _read(what: tuple[str, ...], rigs: tuple[Path | None, ...], opening: Opening
 
 def _table(sets: "Mapping[str, Pairs]", tones_hz: "Real", *, together: bool) -> bytes:
     """CSV with a row for each press of each set, on their scale."""
-    import csv
-    import io
-
     import numpy as np
 
     from sensorgen.measure.signal.presses import normalised
@@ -339,14 +330,12 @@ def _table(sets: "Mapping[str, Pairs]", tones_hz: "Real", *, together: bool) -> 
         normalised([getattr(pairs.difference_ohm, part) for pairs in sets.values()], together=together)
         for part in ("real", "imag")
     ]
-    text = io.StringIO()
-    rows = csv.writer(text, lineterminator="\n")
     names = [f"{part}_share_{units.frequency_text(float(f))}" for part in ("re", "im") for f in tones_hz]
-    rows.writerow(["set", "time_s", "force_n", "position_mm", *names])
-    for (name, pairs), re, im in zip(sets.items(), *scaled, strict=True):
-        for row in np.column_stack([pairs.time_s, pairs.force_n, pairs.position_mm, re, im]).tolist():
-            rows.writerow([name, *(f"{value:.9g}".replace("nan", "") for value in row)])
-    return text.getvalue().encode()
+    rows = (
+        [name, *row] for (name, pairs), re, im in zip(sets.items(), *scaled, strict=True)
+        for row in np.column_stack([pairs.time_s, pairs.force_n, pairs.position_mm, re, im]).tolist()
+    )  # fmt: skip
+    return render.columns(["set", "time_s", "force_n", "position_mm", *names], rows).encode()
 
 
 Rate = Annotated[float, Option(more={"required": True})]

@@ -140,11 +140,12 @@ def _printer(p: printer.Printer) -> ListEntry:
 
 def qualities() -> Catalogue:
     """Print qualities with their layers."""
-    return _of_packs("qualities", lambda file: _quality(printer.load_quality(file.name, _text(file))))
 
+    def entry(file: packs.File) -> ListEntry:
+        q = printer.load_quality(file.name, _text(file))
+        return ListEntry(q.title, (f"layers {q.layer_mm:g} mm, first {q.first_layer_mm:g} mm",))
 
-def _quality(q: printer.Quality) -> ListEntry:
-    return ListEntry(q.title, (f"layers {q.layer_mm:g} mm, first {q.first_layer_mm:g} mm",))
+    return _of_packs("qualities", entry)
 
 
 def instruments() -> Catalogue:

@@ -13,6 +13,7 @@ A name that ends in a unit reads that quantity: ``force_n`` is ``--force``, in n
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import is_dataclass, replace
+from functools import partial
 from inspect import Parameter, getdoc, signature
 from pathlib import Path
 from types import NoneType, UnionType
@@ -209,24 +210,30 @@ def command(
     return made
 
 
+def of_word(word: str, work: Work, *more: click.Parameter, about: str = "") -> click.Command:
+    """Command of a function whose first parameter is the word that calls it."""
+    bound = partial(work, word)
+    bound.__doc__ = work.__doc__
+    return command(word, *more, about=about)(bound)
+
+
 class FirstWord(click.Group):
     """A command whose first word is a thing, as a plan's file, or one of its commands; options follow it."""
 
-    thing = ""
-    form = ""  # of the words, in a message
+    def __init__(
+        self, name: str, work: Work, *more: click.Parameter, thing: str, form: str, **attributes: Any
+    ) -> None:  # fmt: skip
+        """Command of a function, which gets the first word and the values of its own options; ``more`` after them.
 
-    def __init__(self, name: str, **attributes: Any) -> None:
-        """Options belong to the first word."""
+        Messages call the first word ``thing``, and the words of the command ``form``.
+        """
         settings = {"ignore_unknown_options": True, **HELP}
         super().__init__(name, options_metavar="", context_settings=settings, **attributes)
-
-    def of(self, name: str) -> click.Command:
-        """The command for a thing."""
-        raise NotImplementedError
+        self.work, self.more, self.thing, self.form = work, more, thing, form
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         """One of the commands, or the one for a thing."""
-        return super().get_command(ctx, name) or self.of(name)
+        return super().get_command(ctx, name) or of_word(name, self.work, *self.more)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str],

@@ -1,8 +1,10 @@
 """``sensorgen demo``: the whole loop on a virtual laboratory."""
 
 import webbrowser
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import click
 
@@ -12,16 +14,12 @@ from sensorgen.cli.options import Out
 from sensorgen.core.options import Option
 
 command = click.Group("demo", help="Demonstrations that need no hardware.")
+FORMS = render.options("json", "markdown", folder=True)
 Prints = Annotated[int, Option(kind=click.IntRange(1, 20))]
 Seed = Annotated[int, Option(kind=click.IntRange(0))]
 
 
-@of_function(
-    "lab",
-    *render.options("json", "markdown", folder=True),
-    group=command,
-    short="The whole loop on a virtual column of five.",
-)
+@of_function("lab", *FORMS, group=command, short="The whole loop on a virtual column of five.")
 def _lab(*, out: Out = Path("out/demo-lab"), count: Prints = 5, seed: Seed = 1, show_it: bool = True) -> None:
     """Design, print, press, calibrate, find presses again, report: on a virtual column of sensors.
 
@@ -41,17 +39,10 @@ def _lab(*, out: Out = Path("out/demo-lab"), count: Prints = 5, seed: Seed = 1, 
     """
     from sensorgen.workflows.demo import demo
 
-    with render.progress(["demo"]) as step:
-        loop = demo(out, count=count, seed=seed, step=step)
-    render.deliver(loop)
-    if show_it:
-        webbrowser.open(Path(loop.page).resolve().as_uri())
+    _shown(partial(demo, out, count=count, seed=seed), show_it=show_it)
 
 
-@of_function(
-    "insole", *render.options("json", "markdown", folder=True), group=command,
-    short="An insole, from its outline to pressure maps beside the truth.",
-)  # fmt: skip
+@of_function("insole", *FORMS, group=command, short="An insole, from its outline to pressure maps beside the truth.")
 def _insole(*, out: Out = Path("out/demo-insole"), seed: Seed = 1, show_it: bool = True) -> None:
     """Outline, design, check, virtual print with two faults, calibration, a step, maps beside the truth, report.
 
@@ -68,8 +59,13 @@ def _insole(*, out: Out = Path("out/demo-insole"), seed: Seed = 1, show_it: bool
     """
     from sensorgen.workflows.insole import demo
 
+    _shown(partial(demo, out, seed=seed), show_it=show_it)
+
+
+def _shown(demo: Callable[..., Any], *, show_it: bool) -> None:
+    """Run a demonstration, deliver its result, and open its page."""
     with render.progress(["demo"]) as step:
-        steps = demo(out, seed=seed, step=step)
-    render.deliver(steps)
+        result = demo(step=step)
+    render.deliver(result)
     if show_it:
-        webbrowser.open(Path(steps.page).resolve().as_uri())
+        webbrowser.open(Path(result.page).resolve().as_uri())

@@ -36,8 +36,6 @@ class _TipOption:
 class DesignGroup(FirstWord):
     """A command whose first word is a shape or a design file; each shape brings its own options."""
 
-    thing, form = "shape", "{{SHAPE|DESIGN.yaml}} {option} ..."
-
     def __init__(
         self, name: str, work: Work, *more: click.Parameter, tip: bool = False, parts: Parts | None = None,
         **attributes: Any,
@@ -48,11 +46,14 @@ class DesignGroup(FirstWord):
         """
         super().__init__(
             name,
+            work,
+            thing="shape",
+            form="{{SHAPE|DESIGN.yaml}} {option} ...",
             subcommand_metavar="{SHAPE|DESIGN.yaml} [OPTIONS]",
             epilog="SHAPE --help lists the options of the shape and of its print, too.",
             **attributes,
         )
-        self.work, self.parts = work, parts or (lambda design, _: (design,))
+        self.parts = parts or (lambda design, _: (design,))
         self.own = [*(options_of(_TipOption) if tip else []), *options_of(work), *more]
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
@@ -167,25 +168,24 @@ def _parameter_options(params: type, taken: set[str]) -> list[click.Parameter]:
     """Options for a shape's parameters; one that the command has itself is led by "shape", as ``--shape-tip``."""
     options: list[click.Parameter] = []
     for field in dataclasses.fields(params):
-        choices = field.metadata.get("choices")
+        default = f"{field.default:g}" if isinstance(field.default, float) else field.default
         option = f"--{field.name.removesuffix('_mm').removesuffix('_deg').replace('_', '-')}"
         option = f"--shape{option[1:]}" if option in taken else option
         options.append(
             click.Option(
                 [option, _OF_SHAPE + field.name],
-                type=OneOf(choices) if choices else _number_type(field),
-                help=f"{field.metadata['help']}  [default: {_plainly(field.default)}]",
+                type=_kind(field),
+                help=f"{field.metadata['help']}  [default: {default}]",
             )
         )
     return options
 
 
-def _number_type(field: "dataclasses.Field[Any]") -> "click.ParamType[Any]":
+def _kind(field: "dataclasses.Field[Any]") -> "click.ParamType[Any]":
+    """Kind of a parameter's words: one of its choices, a number, or a length."""
+    if choices := field.metadata.get("choices"):
+        return OneOf(choices)
     return click.FLOAT if field.name.endswith("_deg") or field.metadata.get("count") else Length()
-
-
-def _plainly(default: Any) -> str:
-    return f"{default:g}" if isinstance(default, float) else str(default)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,5 +1,7 @@
-"""``sensorgen calibrate|fit|characterise``: specimens, and values of materials, by what was measured."""
+"""``sensorgen calibrate|fit|characterise|report``: specimens, and values of materials, by what was measured."""
 
+import re
+import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +21,7 @@ from sensorgen.core.options import Option
 
 if TYPE_CHECKING:
     from sensorgen.analysis.fit import Fit
+    from sensorgen.analysis.report import Report
     from sensorgen.core.document import Documented
     from sensorgen.measure.log import Log
 
@@ -158,53 +161,46 @@ def _options(values: "Fit") -> str:
     return " ".join(f"--material {part}={name}@{values.source}" for name, part in parts.items())
 
 
-class _PrinterGroup(FirstWord):
-    """A command whose first word is a printer, or ``read``."""
+def _printer(
+    name: str, materials: tuple[str, ...], *, quality: str = "fine", tools: tuple[str, ...] = (), plate: str = "",
+    count: int = 12, hours: float = 4.0, out: Out = Path("out"),
+) -> "Documented":  # fmt: skip
+    """Choose coupons and write their plate's files.
 
-    thing, form = "printer", "PRINTER MATERIALS {option}"
+    Parameters
+    ----------
+    materials : MATERIALS
+    quality : NAME
+        Print quality.
+    tools, --tool : MATERIAL=NUMBER
+        Tool of a material.
+    plate, --name : NAME
+        Of the plate, and of its folder.
+    count
+        Most coupons.
+    hours
+        Longest print [h].
+    out
+        Folder of plates.
+    """
+    from sensorgen.workflows.characterise import STEPS, Study, plan
 
-    def of(self, name: str) -> click.Command:
-        """The command for a printer."""
-
-        @of_function(name, *render.options(folder=True))
-        def printer(
-            materials: tuple[str, ...], *, quality: str = "fine", tools: tuple[str, ...] = (), plate: str = "",
-            count: int = 12, hours: float = 4.0, out: Out = Path("out"),
-        ) -> "Documented":  # fmt: skip
-            """Choose coupons and write their plate's files.
-
-            Parameters
-            ----------
-            materials : MATERIALS
-            quality : NAME
-                Print quality.
-            tools, --tool : MATERIAL=NUMBER
-                Tool of a material.
-            plate, --name : NAME
-                Of the plate, and of its folder.
-            count
-                Most coupons.
-            hours
-                Longest print [h].
-            out
-                Folder of plates.
-            """
-            from sensorgen.workflows.characterise import STEPS, Study, plan
-
-            pairs = {word: word.partition("=") for word in tools}
-            if wrong := next((word for word, (_, _, number) in pairs.items() if not number.isdigit()), None):
-                raise BadInput(f"--tool {wrong!r}; expected MATERIAL=NUMBER, as in etpu=3")
-            names = [material for word in materials for material in word.split(",")]
-            numbers = {key: int(number) for key, _, number in pairs.values()}
-            with render.progress(STEPS) as step:
-                study = Study.of(name, names, quality=quality, tools=numbers)
-                return plan(study, out, name=plate, count=count, hours=hours, step=step)
-
-        return printer
+    pairs = {word: word.partition("=") for word in tools}
+    if wrong := next((word for word, (_, _, number) in pairs.items() if not number.isdigit()), None):
+        raise BadInput(f"--tool {wrong!r}; expected MATERIAL=NUMBER, as in etpu=3")
+    names = [material for word in materials for material in word.split(",")]
+    numbers = {key: int(number) for key, _, number in pairs.values()}
+    with render.progress(STEPS) as step:
+        study = Study.of(name, names, quality=quality, tools=numbers)
+        return plan(study, out, name=plate, count=count, hours=hours, step=step)
 
 
-characterise_command = _PrinterGroup(
+characterise_command = FirstWord(
     "characterise",
+    _printer,
+    *render.options(folder=True),
+    thing="printer",
+    form="PRINTER MATERIALS {option}",
     subcommand_metavar="{PRINTER MATERIALS|read FORM} [OPTIONS]",
     help="""Print test structures (coupons), and turn their readings into material values.
 
@@ -237,10 +233,82 @@ def _read(
         Replace a source of that name.
     """
     from sensorgen.core import files
-    from sensorgen.workflows.characterise import read
-    from sensorgen.workflows.characterise.intervals import svg
+    from sensorgen.workflows.characterise import read, svg
 
     values = read(form, name, keep=not dry_run, force=force)
     if picture:
         files.replace(picture, svg(values.source, values.rows).encode())
     return values
+
+
+Format = Annotated[str, Option(kind=("html", "md", "csv", "json"))]
+
+
+@of_function("report")
+def report_command(
+    specimens: tuple[str, ...] = (), *, iteration: Iteration = None,
+    log: LogFile, output: str = "", how: Format = "html", pictures: Path | None = None, show_it: bool = False,
+) -> None:  # fmt: skip
+    """Compare predictions and measurements of specimens, of an iteration, or of everything in the log.
+
+    One HTML file that needs no network, or Markdown, CSV or JSON with the same numbers. Prints the headline and the
+    name of the file.
+
+    Parameters
+    ----------
+    specimens : [SPECIMEN]...
+    output, --output, -o : FILE
+        File to write; report-WHICH.FORMAT here if not given, - to print.
+    how, --format
+        Of the file.
+    iteration
+        Of the design.
+    pictures, --figures : FOLDER
+        Write every figure there too, as PNG and SVG.
+    show_it, --open
+        Show the page in the browser.
+    """
+    from sensorgen.analysis.report import pieces
+    from sensorgen.analysis.report.contents import STEPS, report
+
+    if show_it and (how != "html" or output == "-"):
+        raise BadInput("--open shows an HTML file; expected --format html and a file")
+    if specimens and iteration is not None:
+        raise BadInput(f"--iteration {iteration} beside specimens; expected one of the two")
+    with log.opened() as rows, render.progress(STEPS) as step:
+        compared = report(rows, iteration, step, specimens=specimens)
+    if pictures:
+        _draw(compared, pictures)
+    if output == "-":
+        render.write(pieces(compared, how))
+        return
+    path = Path(output or f"report-{_which(compared, iteration)}.{how}")
+    _write(compared, path, how)
+    if show_it:
+        webbrowser.open(path.resolve().as_uri())
+
+
+def _which(compared: "Report", iteration: int | None) -> str:
+    """Iteration, first specimen, or all, as a part of a file's name."""
+    if iteration is not None:
+        return str(iteration)
+    return re.sub(r"\W+", "-", compared.specimens[0]) if compared.specimens else "all"
+
+
+def _write(compared: "Report", path: Path, how: str) -> None:
+    """Write the file, and print the headline and its name."""
+    from sensorgen.analysis.report import pieces
+    from sensorgen.core import document, files
+
+    with files.replacing(path) as target:
+        target.writelines(piece.encode() for piece in pieces(compared, how))
+    render.write(f"{line}\n" for line in document.text([*compared.headline, str(path)]))
+
+
+def _draw(compared: "Report", folder: Path) -> None:
+    from sensorgen.analysis.plots.static import files
+
+    with render.progress([figure.key for figure in compared.figures]) as step:
+        for figure in compared.figures:
+            step(figure.key)
+            render.written(folder, files(figure))

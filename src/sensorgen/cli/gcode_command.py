@@ -137,7 +137,6 @@ def _pinholes(
         Write a plan there, PNG and SVG.
     """
     from sensorgen.analysis.shorts import risk
-    from sensorgen.core import files as store
     from sensorgen.design.design import load
 
     verdicts = [LogFile(log).of_command()] if log else []
@@ -145,8 +144,7 @@ def _pinholes(
     if pictures:
         from sensorgen.analysis.plots.static import files
 
-        for name, content in files(figure):
-            store.replace(pictures / name, content)
+        render.written(pictures, files(figure))
     return shorts
 
 

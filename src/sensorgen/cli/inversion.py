@@ -146,11 +146,11 @@ def invert(design: "Design", task: Task, frames: ArrayFrames) -> int:
     if output := task.output or "-" * task.terminal:
         _write(maps, output)
     if frames.plot is not None:
-        from sensorgen.analysis.plots import array
+        from sensorgen.analysis.plots import array, static
 
         true = None if read_in.pressure_kpa is None else read_in.pressure_kpa[~read_in.rest]
         true = model.carried(true) if true is not None and frames.cells else true
-        render.file(frames.plot / f"{design.name}-map.png", array.maps(maps, true), "wrote ")
+        render.file(frames.plot / f"{design.name}-map.png", static.png(array.figure(maps, true)), "wrote ")
     for piece in render.pieces(maps, render.form()):
         render.say(piece, nl=False, err=task.terminal)
     if not output:
@@ -235,7 +235,6 @@ def invert_calibrated(calibration: str, task: Task) -> int:
     import numpy as np
 
     from sensorgen.core import files
-    from sensorgen.core.document import Column, Table, comma_separated
     from sensorgen.measure.array_frames import session
     from sensorgen.prediction.array.sessions import stored
 
@@ -252,9 +251,7 @@ def invert_calibrated(calibration: str, task: Task) -> int:
     elements = known.names or range(1, mean.shape[1] + 1)
     names = [f"{part}_{element}_kpa" for element in elements for part in ("p", "half")]
     both = np.stack([mean, half], -1).reshape(len(mean), -1)
-    cells = [[None if v != v else v for v in row] for row in np.column_stack([of.time_s, both]).tolist()]
-    columns = tuple(Column(name, key=name) for name in ("time_s", *names))
-    text = comma_separated(Table("pressures", "", columns, tuple(map(tuple, cells))))
+    text = render.columns(["time_s", *names], np.column_stack([of.time_s, both]).tolist())
     if output in ("", "-"):
         print(text, end="")
         return 0

@@ -9,7 +9,7 @@ import numpy as np
 
 from sensorgen.cli import inversion, render
 from sensorgen.cli.body_options import BodyChoice
-from sensorgen.cli.commands import command as of_function
+from sensorgen.cli.commands import of_word
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.inversion import Task
 from sensorgen.cli.options import ArrayFrames, Law, LogFile
@@ -250,21 +250,11 @@ class _Specimens(DesignGroup):
     def get_command(self, ctx: click.Context, name: str) -> click.Command:
         """The command for a shape, a design file, a calibration of an array, or a specimen."""
         if name.endswith(".npz"):
-
-            @of_function(name, about=inversion.invert_calibrated.__doc__ or "")
-            def calibrated(task: Task) -> int:
-                return inversion.invert_calibrated(name, task)
-
-            return calibrated
+            return of_word(name, inversion.invert_calibrated)
         try:
             return super().get_command(ctx, name)
         except UnknownName:
-
-            @of_function(name, *FORMS, about=_of_specimen.__doc__ or "")
-            def specimen(task: Task, file: LogFile) -> int:
-                return _of_specimen(name, task, file)
-
-            return specimen
+            return of_word(name, _of_specimen, *FORMS)
 
 
 command = _Specimens(

@@ -203,7 +203,7 @@ class Advising:
         if not (word.endswith((".yaml", ".yml")) or "/" in word):
             settings = " ".join(_setting(one) for one in change.changes)
             raise BadInput(f"--apply: {word} is no design file; use these options: {settings}")
-        from sensorgen.workflows.apply import apply
+        from sensorgen.workflows.changes import apply
 
         apply(Path(word), design, change)
         changes = ", ".join(one.words() for one in change.changes)

@@ -82,7 +82,7 @@ def predict_command(
     plot : DIR
         Draw R, X, sensitivities and inverse maps there, as PNG and HTML.
     details
-        Also print impedance, a perfect model's resolution, error budget.
+        Also print impedance, a perfect model's resolution, what would improve it, error budget.
     """
     from sensorgen.prediction.results import Prediction
 
@@ -99,8 +99,8 @@ def predict_command(
     if plot:
         _plot(result, plot)
     else:
-        asked = query.accuracy is not None or options.typed("frequency_hz")
-        _deliver(result, detailed=any((result is not prediction, details, explain, asked)), explain=explain)
+        asked = query.accuracy is not None or (options.typed("frequency_hz") and result is prediction)
+        _deliver(result, detailed=any((details, explain, asked)), explain=explain)
     if missing := prediction.missing():
         render.say(f"sensorgen: {missing}", err=True)
         return WRONG_INPUT
@@ -131,11 +131,17 @@ def _answer(body: "Body", query: Query, pressing: Pressing, *, whole: bool) -> A
 
 
 def _deliver(result: Any, *, detailed: bool, explain: bool) -> None:
-    """Deliver a prediction, its first screen alone if it is not detailed."""
-    from sensorgen.prediction.results import Overview
+    """Deliver a prediction, loaded or not, its first screen alone if it is not detailed."""
+    from sensorgen.prediction.results import Overview, Prediction
 
     before = getattr(result, "prediction", result).explained() if explain else ()
-    render.deliver(result if detailed else Overview(**vars(result)), before=before)
+    if not detailed and isinstance(result, Prediction):
+        result = Overview(**vars(result))
+    elif not detailed:
+        from sensorgen.prediction.loaded import LoadedOverview
+
+        result = LoadedOverview(result.prediction, result.model, result.axes, result.noise, result.left_out)
+    render.deliver(result, before=before)
 
 
 def _plot(result: "Loaded", folder: Path) -> None:

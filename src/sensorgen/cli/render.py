@@ -16,7 +16,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
 
 if TYPE_CHECKING:
-    from sensorgen.core.document import Documented, Part
+    from sensorgen.core.document import Cell, Documented, Part
 
 
 @contextmanager
@@ -223,6 +223,25 @@ def file(path: Path, content: bytes | str, note: str = "") -> None:
 
     files.replace(path, content.encode() if isinstance(content, str) else content)
     say(f"{note}{path}", err=bool(form()))
+
+
+def written(folder: Path, contents: "Iterable[tuple[str, bytes]]") -> list[str]:
+    """Write files into a folder; where each is."""
+    from sensorgen.core import files
+
+    names = []
+    for name, content in contents:
+        files.replace(folder / name, content)
+        names.append(str(folder / name))
+    return names
+
+
+def columns(names: Sequence[str], rows: "Iterable[Sequence[Cell]]") -> str:
+    """CSV of rows below the names of their columns, all digits; empty where nothing is known."""
+    from sensorgen.core.document import Column, Table, comma_separated
+
+    cells = tuple(tuple(None if cell != cell else cell for cell in row) for row in rows)
+    return comma_separated(Table("", "", tuple(map(Column, names)), cells))
 
 
 def write(text: Iterable[str]) -> None:

@@ -90,10 +90,10 @@ def sheet_command(
             step=lambda name, count: step(f"{name} {count + 1}/{places}"),
         )  # fmt: skip
     if plot is not None:
-        from sensorgen.analysis.plots import results
+        from sensorgen.analysis.plots import results, static
 
-        picture = results.sheet_png(bounds.sheet, bounds.bounds, bounds.ports)
-        render.file(plot / f"{design.name}-sheet.png", picture, "wrote ")
+        figure = results.sheet(bounds.sheet, bounds.bounds, bounds.ports)
+        render.file(plot / f"{design.name}-sheet.png", static.png(figure), "wrote ")
     return bounds
 
 
@@ -145,9 +145,9 @@ def array_command(
 
         render.file(simulate, step(model, how, faults), "wrote ")
     if plot is not None:
-        from sensorgen.analysis.plots import array
+        from sensorgen.analysis.plots import array, static
 
-        render.file(plot / f"{design.name}-array.png", array.png(resolution), "wrote ")
+        render.file(plot / f"{design.name}-array.png", static.png(array.resolution(resolution)), "wrote ")
         render.file(plot / f"{design.name}-array.html", array.page(resolution, *_foot(model, how)), "wrote ")
     return resolution
 

@@ -12,7 +12,7 @@ import shapely
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.scene.geometry.meshes import Mesh
-from sensorgen.scene.layers import LayerRegions, is_rectilinear
+from sensorgen.scene.layers import LayerRegions, inside, is_rectilinear
 from sensorgen.scene.scene import Body
 
 GRID_MM = 1e-3  # of corners in plan, as in G-code; edges nearer than this are one
@@ -82,12 +82,11 @@ def voxels(layers: Sequence[LayerRegions], bodies: Sequence[str], size_mm: Seque
             f"voxels of {pitch_mm:g} mm: {count / 1e6:.3g} million; expected at most {MOST_VOXELS / 1e6:g} million: "
             f"take --voxel {pitch_mm * (count / MOST_VOXELS) ** (1 / 3) * 1.1:.2g} or more, or a smaller sensor"
         )
-    places = np.meshgrid((x[1:] + x[:-1]) / 2, (y[1:] + y[:-1]) / 2, indexing="ij")
-    plans = np.full((len(layers), *places[0].shape), -1)
+    places = (x[1:] + x[:-1]) / 2, (y[1:] + y[:-1]) / 2
+    plans = np.full((len(layers), *map(len, places)), -1)
     for plan, layer in zip(plans, layers, strict=True):
         for name, region in layer.regions.items():
-            shapely.prepare(region)
-            plan[shapely.contains_xy(region, *places)] = bodies.index(name)
+            plan[inside(region, *places)] = bodies.index(name)
     number = np.searchsorted(faces, (z[1:] + z[:-1]) / 2) - 1
     return Voxels((x, y, z), np.moveaxis(plans[number], 0, -1))
 

@@ -335,6 +335,18 @@ class Loaded(Displayed):
 
     def document(self) -> Iterator[Part]:
         """Ranges of R and X, how much they change, corners at the last frequency, and the judgement of a reading."""
+        _, force, at = self.axes
+        yield from self._ranges()
+        if len(force) > 1 or len(at) > 1:
+            yield ""
+            yield self._changes()
+        yield ""
+        yield self._corners()
+        yield ""
+        yield from self.prediction.judgement()
+
+    def _ranges(self) -> Iterator[Part]:
+        """For which presses, and ranges of R and X."""
         (_, force, at), sensor = self.axes, self.model.sensor
         touches = float(sensor.contact_m(force[-1])[0])
         grown = f", contact {touches / M_PER_MM:.3g} mm at {force[-1]:g} N" if touches < sensor.tip_m else ""
@@ -345,13 +357,6 @@ class Loaded(Displayed):
         yield from (f"doubtful: {doubt}" for doubt in self.doubts)
         yield ""
         yield self._ends()
-        if len(force) > 1 or len(at) > 1:
-            yield ""
-            yield self._changes()
-        yield ""
-        yield self._corners()
-        yield ""
-        yield from self.prediction.judgement()
 
     def _ends(self) -> Table:
         """Least and largest R and X of each frequency."""
@@ -417,6 +422,20 @@ class Loaded(Displayed):
     def csv(self) -> Iterator[str]:
         """R and X, a row per force and position, as :func:`sensorgen.prediction.loaded.csv_blocks`."""
         return csv_blocks(self.model.sensor, *self.axes)
+
+
+class LoadedOverview(Loaded):
+    """A loaded prediction whose document is its first screen."""
+
+    def document(self) -> Iterator[Part]:
+        """Ranges of R and X, corners at the last frequency, and the verdict on a press."""
+        yield from self._ranges()
+        yield ""
+        yield self._corners()
+        yield ""
+        known = self.prediction.identifiability
+        yield f"{known.verdict}." if known else f"no load: {self.prediction.reason}"
+        yield "(--details: changes of R and X, what would improve the sensor, error budget)"
 
 
 def loaded(body: Body, query: Query, force_n: Sequence[float] = (), position_mm: Sequence[float] = ()) -> Loaded:

@@ -172,7 +172,7 @@ def fineness(model: str, level: int) -> "Fineness | BrickCounts":
     from sensorgen.models import press2d, press_round
 
     usual = press_round.USUAL if model == "press_round" else press2d.Fineness()
-    size = usual.scaled(_TIMES[level])
+    size = replace(usual.scaled(_TIMES[level]), straight=level <= COARSEST)
     return replace(size, apex_mm=size.coarse_mm) if level == ROUGH else size
 
 

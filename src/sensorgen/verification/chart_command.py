@@ -44,7 +44,6 @@ def _of_design(
         Folder of the files.
     """
     from sensorgen.analysis.plots.figure import needed
-    from sensorgen.core import files as store
     from sensorgen.core.document import to_json
     from sensorgen.prediction.query import Query
     from sensorgen.verification.design_chart import plot
@@ -63,11 +62,10 @@ def _of_design(
     if measured.points:
         contents |= {"chart.png": plot.png(measured)}
     contents["chart.html"] = plot.html(measured).encode()
-    for name, content in contents.items():
-        store.replace(output / name, content)
+    names = render.written(output, contents.items())
     render.deliver(measured)
     if not render.form():
-        render.say("\n".join(str(output / name) for name in contents))
+        render.say("\n".join(names))
     return render.verdict(*measured.problems())
 
 
@@ -92,7 +90,6 @@ def _of_scenes(
     import io
 
     from sensorgen.analysis.plots.figure import needed
-    from sensorgen.core import files as store
     from sensorgen.verification import chart
     from sensorgen.verification.chart import plot
 
@@ -111,12 +108,8 @@ def _of_scenes(
     contents = dict(zip(FILES, (text.getvalue().encode(), plot.png(points), plot.html(points).encode()), strict=True))
     if overview := plot.overview(points):
         contents["overview.png"] = overview
-    for name, content in contents.items():
-        store.replace(output / name, content)
-        if not as_json:
-            render.say(output / name)
-    if as_json:
-        render.say(escaped(json.dumps(rows, indent=2, ensure_ascii=False)))
+    where = render.written(output, contents.items())
+    render.say(escaped(json.dumps(rows, indent=2, ensure_ascii=False)) if as_json else "\n".join(where))
 
 
 def _begin(**given: Any) -> None:

@@ -3,11 +3,15 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
+from pathlib import Path
 from typing import ClassVar
 
+from sensorgen.core import files, yamlfile
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import Facts, Part
+from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding, grouped
+from sensorgen.design.design import Design, load, make
 from sensorgen.prediction.identifiability.results import GUESS
 from sensorgen.workflows.trial import Trial, words_of
 
@@ -131,6 +135,34 @@ class Advice:
         ended = f"; ended by the budget of {self.budget_s:g} s (--budget)" if spent else "; that many are tried at most"
         limit = "" if self.complete else ended
         yield f"({effort}{limit}; not tried: {self.not_tried})"
+
+
+def apply(path: Path, design: Design, change: TriedChange) -> None:
+    """Write a change into a design file, as a whole or not at all; comments and order stay.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    design : Design
+        What the change was tried on.
+    change : TriedChange
+        What to write.
+
+    Raises
+    ------
+    BadInput
+        The file holds another design, as with options beside it, or cannot be changed in place.
+    """
+    if load(path).id() != design.id():
+        raise BadInput(f"--apply: options change {path} too; expected the file alone: write them into it first")
+    text = yamlfile.text(path)
+    values = {tuple(one.key.split(".")): one.after for one in change.changes}
+    edited = yamlfile.changed(text, values, str(path))
+    if make({"name": path.stem} | yamlfile.parse(edited, str(path)), str(path)).id() != change.trial.design:
+        raise BadInput(f"--apply: {path} would not become the design that was tried: edit it by hand")
+    start = b"\xef\xbb\xbf" if path.read_bytes().startswith(b"\xef\xbb\xbf") else b""
+    files.replace(path, start + edited.encode())
 
 
 def effects(now: Trial, then: Trial) -> tuple[bool, str]:

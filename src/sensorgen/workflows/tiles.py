@@ -75,7 +75,8 @@ def tiles(design: Design) -> tuple[tuple[Tile, Design], ...]:
     for across, up in sorted(splits, key=prod):
         places = tuple(_places(design, across, up))
         if all(_fits(layout(Params(**own)), design) for _, own in places):
-            return tuple((tile, _made(design, tile, own)) for tile, own in places)
+            base = design.model_dump(mode="json", exclude_defaults=True)
+            return tuple((tile, make({**base, "parameters": own, "name": tile.design})) for tile, own in places)
     length, width = design.layout.size_mm
     raise BadInput(
         f"{design.name} is {length:g} x {width:g} mm, the bed {bed_x:g} x {bed_y:g} mm; tiles in two columns are too "
@@ -125,8 +126,3 @@ def _places(design: Design, across: int, up: int) -> Iterator[tuple[Tile, dict[s
             name = f"{design.name[:90]}-{number}"
             place = rounded(j0 * px), rounded(i0 * py)
             yield Tile(number, name, 180 * right, *place, long, wide, j1 - j0, i1 - i0), own
-
-
-def _made(design: Design, tile: Tile, own: dict[str, Any]) -> Design:
-    """Design of a tile."""
-    return make({**design.model_dump(mode="json", exclude_defaults=True), "parameters": own, "name": tile.design})

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.analysis.comparison import of_iteration
-from sensorgen.analysis.comparison.allowed import AllowedValues, allowed
+from sensorgen.analysis.comparison.specimens import AllowedValues, allowed
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.core.units import M_PER_MM

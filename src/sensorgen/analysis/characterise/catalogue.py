@@ -8,11 +8,15 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import hypot, log, pi
+from typing import Annotated
 
 import numpy as np
+from pydantic import BeforeValidator, Field
 
 from sensorgen.core.arrays import Real
-from sensorgen.core.units import M_PER_MM
+from sensorgen.core.errors import BadInput
+from sensorgen.core.records import Strict
+from sensorgen.core.units import LENGTH_MM, M_PER_MM, NUMBER, Quantity
 from sensorgen.design.materials import INTERFACE_GAP, Material
 from sensorgen.models import coupons as closed
 from sensorgen.prediction.inference import Parameter
@@ -104,6 +108,16 @@ class CouponReading:
     how: str
     load_n: float = 0.0
 
+    @property
+    def field(self) -> str:
+        """Key of its number in a form: of a stiffness, the compression."""
+        return f"{self.key}_mm" if self.kind == "stiffness" else self.key
+
+    @property
+    def unit(self) -> float:
+        """Unit of that number over ohm or F [-]."""
+        return 1e-12 if self.kind == "capacitance" else 1.0
+
 
 @dataclass(frozen=True)
 class Coupon:
@@ -142,29 +156,36 @@ class Coupon:
         return next(size.drawn for size in self.sizes if size.key == key)
 
 
-@dataclass(frozen=True)
-class Meters:
-    """Standard deviations of the instruments.
+def _in(quantity: Quantity) -> BeforeValidator:
+    """Validator of a number that may be typed with its unit."""
 
-    Attributes
-    ----------
-    resistance, capacitance, force : float
-        Relative [-].
-    calipers_mm, compression_mm : float
-        Absolute [mm].
-    """
+    def read(value: object) -> object:
+        try:
+            return quantity.read(value) if isinstance(value, str) else value
+        except BadInput as error:
+            raise ValueError(str(error)) from None
 
-    resistance: float = 0.01
-    capacitance: float = 0.01
-    force: float = 0.01
-    calipers_mm: float = 0.01
-    compression_mm: float = 0.002
+    return BeforeValidator(read)
+
+
+Percent = Annotated[float, _in(NUMBER), Field(ge=1e-6, le=50)]
+Length = Annotated[float, _in(LENGTH_MM), Field(ge=1e-6, le=50)]
+
+
+class Meters(Strict):
+    """Standard deviations of the instruments: relative [%], or absolute [mm]."""
+
+    resistance_percent: Percent = 1.0
+    capacitance_percent: Percent = 1.0
+    force_percent: Percent = 1.0
+    calipers_mm: Length = 0.01
+    compression_mm: Length = 0.002
 
     def noise(self, reading: CouponReading, stiffness_n_per_m: float = 0.0) -> float:
         """Standard deviation of a reading's logarithm."""
         if reading.kind != "stiffness":
-            return self.resistance if reading.kind == "resistance" else self.capacitance
-        return hypot(self.force, self.compression_mm * M_PER_MM * stiffness_n_per_m / reading.load_n)
+            return (self.resistance_percent if reading.kind == "resistance" else self.capacitance_percent) / 100
+        return hypot(self.force_percent / 100, self.compression_mm * M_PER_MM * stiffness_n_per_m / reading.load_n)
 
 
 def _range(material: Material, quantity: str, low: float, high: float) -> tuple[float, float]:

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from sensorgen.analysis.plots.figure import thinned_together
-from sensorgen.core.arrays import Complex, Real
+from sensorgen.analysis.plots.recordings import DrawnRecording
+from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.lazy import Lazy
 from sensorgen.measure.log import BenchRun, Log, Reading
 from sensorgen.measure.log.bench import read_again
 from sensorgen.measure.recording import Joined, Recording, RigLog, Source, joined_all
-from sensorgen.measure.signal import presses
 from sensorgen.measure.signal.run import processed
 
 
@@ -114,8 +114,8 @@ def readings(logged: Iterable[Reading]) -> IterationReadings:
 
 
 @dataclass(frozen=True, eq=False)
-class RecordedRun:
-    """A recording, or a part of one, without its samples.
+class RecordedRun(DrawnRecording):
+    """A recording, or a part of one; of its samples, those that are drawn: of many, the least and largest of stretches.
 
     Attributes
     ----------
@@ -123,49 +123,35 @@ class RecordedRun:
         As logged.
     source : Source
         Its origin.
-    tones_hz : (m,) array
-        Frequencies [Hz].
     samples, valid : int
         Samples, and valid ones.
     seconds : float
         Time of the last sample [s].
-    time_s, raw_ohm : (n,), (n, m) array
-        Valid samples to be drawn: of many, the least and the largest of each stretch [s], [ohm].
-    filtered_s, filtered_ohm : (k,), (k, m) array
-        The same, low-passed forward and backward [s], [ohm].
     rest_ohm, rest_error_ohm : (m,) array
         Impedance at rest, and its standard error: of R in the real, of X in the imaginary part [ohm].
     noise_ohm : (m,) array
         Standard deviation of one sample at rest, drift included, in the same way [ohm].
-    pairs : Pairs or None
-        Before and under each press; None where there are none, or no force is known.
     notes : tuple of str
         What was left out, or taken with care.
     """
 
     entry: BenchRun
     source: Source
-    tones_hz: Real
     samples: int
     valid: int
     seconds: float
-    time_s: Real
-    raw_ohm: Complex
-    filtered_s: Real
-    filtered_ohm: Complex
     rest_ohm: Complex
     rest_error_ohm: Complex
     noise_ohm: Complex
-    pairs: presses.Pairs | None
     notes: tuple[str, ...]
 
-    @property
-    def name(self) -> str:
-        """Specimen, the recording's number in the log, and whether it is simulated."""
-        part = f", part {self.source.part}" if self.source.part else ""
-        lockin = f", lock-in {self.source.lockin}" if self.source.lockin > 1 else ""
-        simulated = ", simulated" if self.entry.simulated else ""
-        return f"{self.entry.specimen}, recording {self.entry.number}{part}{lockin}{simulated}"
+
+def _name(entry: BenchRun, source: Source) -> str:
+    """Specimen, the recording's number in the log, and whether it is simulated."""
+    part = f", part {source.part}" if source.part else ""
+    lockin = f", lock-in {source.lockin}" if source.lockin > 1 else ""
+    simulated = ", simulated" if entry.simulated else ""
+    return f"{entry.specimen}, recording {entry.number}{part}{lockin}{simulated}"
 
 
 def runs(
@@ -235,7 +221,7 @@ def _of_part(entry: BenchRun, lockins: Sequence[Recording], pressed: RigLog | No
         raw = np.flatnonzero(valid)[thinned_together(one.impedance_ohm, valid)]
         smooth = thinned_together(done.filtered_ohm)
         yield RecordedRun(
-            entry, one.source, one.tones_hz, counts["samples"], counts["valid"], float(one.time_s[-1]),
-            one.time_s[raw], one.impedance_ohm[raw], done.filtered_s[smooth], done.filtered_ohm[smooth], rest, spread,
-            scatter, done.pairs if done.by_force else None, notes,
+            _name(entry, one.source), one.tones_hz, one.time_s[raw], one.impedance_ohm[raw], done.filtered_s[smooth],
+            done.filtered_ohm[smooth], done.pairs if done.by_force else None, entry, one.source, counts["samples"],
+            counts["valid"], float(one.time_s[-1]), rest, spread, scatter, notes,
         )  # fmt: skip

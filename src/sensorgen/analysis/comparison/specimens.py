@@ -4,17 +4,19 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from math import isfinite, isnan, log, nan
+from functools import cached_property, lru_cache
+from math import inf, isfinite, isnan, log, nan
 
 from sensorgen.analysis.comparison.expected import Predicted, stored_or_made
 from sensorgen.analysis.comparison.measured import Measured, readings
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.lazy import Lazy
+from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.design.specimen_name import SpecimenName, design_of, parse
+from sensorgen.design.values import resistivities
 from sensorgen.measure import accuracy
 from sensorgen.measure.log import BenchRun, Entry, Log, Prediction, Print, Reading, Withdrawal
 from sensorgen.measure.log.logbook import conflict
@@ -23,6 +25,7 @@ from sensorgen.measure.signal.verdicts import (
     INTACT_OHM,
     Evidence,
     SignalVerdict,
+    electrode_and_leak,
     expected_from,
     intact_ohm,
     least,
@@ -30,6 +33,7 @@ from sensorgen.measure.signal.verdicts import (
 )
 from sensorgen.prediction import bodies
 from sensorgen.prediction.query import TONES_HZ
+from sensorgen.prediction.rest_state import electrode_resistance
 
 _MOST_LEFT_OUT = 1000  # readings that are listed for one reason
 UNTRUSTED = "shape of"  # a specimen, in the list of what was left out
@@ -290,15 +294,19 @@ def _usual_ohm(
 ) -> Callable[[str, Predicted | None], float]:
     """Reading that is usual along an electrode of a shape and prediction [ohm].
 
-    The prediction times the median of measured over predicted of its shape, but no further than the prediction's range,
-    so that prints that all broke do not vouch for each other; the shape's median where none is predicted.
+    The prediction times the median of measured over predicted of its shape, of the readings within their predicted
+    ranges where there are any: else broken prints vouch for each other, and against a sound one. No further than the
+    prediction's range; the shape's median where none is predicted.
     """
-    ratios: dict[tuple[str, bool], array[float]] = {}
+    within: dict[tuple[str, bool], array[float]] = {}
+    every: dict[tuple[str, bool], array[float]] = {}
     for reading, of in zip(rows, of_rows, strict=True):
-        alone = of.ry_ohm if of else None
-        over = [value / (alone.value if alone else 1.0) for value in least(_evidence(reading, None))]
-        ratios.setdefault((reading.shape, alone is not None), array("d")).extend(over)
-    medians = {key: expected_from(values) for key, values in ratios.items()}
+        alone, ohm = of.ry_ohm if of else None, least(_evidence(reading, None))
+        in_range = [each for each in ohm if alone and alone.lower <= each <= alone.upper]
+        key, value = (reading.shape, alone is not None), alone.value if alone else 1.0
+        for ratios, known in ((every, ohm), (within, in_range)):
+            ratios.setdefault(key, array("d")).extend(each / value for each in known)
+    medians = {key: expected_from(within[key] or values) for key, values in every.items()}
 
     def usual(shape: str, of: Predicted | None) -> float:
         alone = of.ry_ohm if of else None
@@ -341,6 +349,51 @@ def _unused(rows: Iterable[Compared], alternating: Container[int]) -> Iterator[t
             yield name, f"no {missing[0]}: counts for nothing where both are needed"
         if any(value < 0 for value in (*row.reading.y_ohm, *row.reading.z_ohm)):
             yield name, "a resistance below 0 is no reading"
+
+
+@dataclass(frozen=True, slots=True)
+class AllowedValues:
+    """ln of the resistivities [ohm m] that a reading allows, and of the leak per area [S/m2]; nan where unknown."""
+
+    low: float
+    high: float
+    leak: float
+
+
+def usable(row: Compared) -> bool:
+    """Test whether a reading is one of a sound electrode."""
+    return row.verdict.electrode == "sound" and isfinite(row.verdict.ry_ohm) and row.verdict.ry_ohm > 0
+
+
+def allowed(row: Compared, body: Body) -> AllowedValues | None:
+    r"""Resistivity that a reading allows; None without one above 0. A film without a reading is taken for tight.
+
+    An electrode's resistance over its resistivity is known between bounds, and R_Z says how far the other electrode
+    carries current through the film (:mod:`sensorgen.measure.signal.verdicts`). The log does not say which electrode
+    was read: each reading allows a range of :math:`\varrho`.
+    """
+    ry, rz = row.verdict.ry_ohm, row.across_ohm
+    if not 0 < ry < inf:
+        return None
+    ends, design = _per_resistivity(body), body.design
+    area = design.area_mm2 * M_PER_MM**2
+    known = [
+        (this, *electrode_and_leak(ry, inf if isnan(rz) else rz, other.value / this.value))
+        for this, other in zip(ends, ends[::-1], strict=True)
+    ]
+    leak = max(leak for *_, leak in known)
+    low, high = min(ohm / this.upper for this, ohm, _ in known), max(ohm / this.lower for this, ohm, _ in known)
+    return AllowedValues(log(low), log(high), log(leak / area) if 0 < leak < inf else nan)
+
+
+@lru_cache(maxsize=64)
+def _per_resistivity(body: Body) -> list[Bounds]:
+    """Resistance of each electrode over its resistivity, without what the material leaves open [1/m]."""
+    rho = resistivities(body.design)
+    return [
+        Bounds.of(r.value, r.unit, model=r.model, print=r.print).times(1 / rho[end].value, "1/m")
+        for end, r in electrode_resistance(body).items()
+    ]
 
 
 def known_iterations(log: Log) -> list[int]:

@@ -11,8 +11,8 @@ from math import exp, inf, isfinite, log, pi, sqrt
 import numpy as np
 
 from sensorgen.analysis.calibration import SpecimenEntries
-from sensorgen.analysis.comparison.allowed import AllowedValues
 from sensorgen.analysis.comparison.expected import PERMITTIVITY, Movable
+from sensorgen.analysis.comparison.specimens import AllowedValues
 from sensorgen.analysis.fit.results import LEVEL, Fitted, GroupError, Untold
 from sensorgen.core.arrays import Real
 from sensorgen.design.materials import FILM_LEAK

@@ -10,8 +10,8 @@ import numpy as np
 
 from sensorgen.analysis.calibration import Bench, SpecimenEntries, known
 from sensorgen.analysis.comparison import Compared, Comparison, Predicted, of_iteration
-from sensorgen.analysis.comparison.allowed import AllowedValues, allowed, usable
 from sensorgen.analysis.comparison.expected import Movable, at_rest
+from sensorgen.analysis.comparison.specimens import AllowedValues, allowed, usable
 from sensorgen.analysis.fit import estimates
 from sensorgen.analysis.fit.results import Error, Fit, Fitted, Untold
 from sensorgen.core.errors import BadInput, SensorgenError

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sensorgen.analysis.plots import pages, static
+from sensorgen.analysis.plots import pages
 from sensorgen.analysis.plots.figure import GREY, Axis, Curve, Figure, Map, Panel
 from sensorgen.core.arrays import Real
 
@@ -15,11 +15,6 @@ if TYPE_CHECKING:
     from sensorgen.design.arrays import ArrayLayout
     from sensorgen.prediction.array.frames import PressureMaps
     from sensorgen.prediction.array.study import ArrayStudy
-
-
-def png(study: "ArrayStudy") -> bytes:
-    """Standard errors of pressure over the outline, and crosstalk where it is known, as PNG."""
-    return static.png(resolution(study))
 
 
 def resolution(study: "ArrayStudy", name: str = "array", title: str = "") -> Figure:
@@ -58,11 +53,6 @@ def page(study: "ArrayStudy", found: "PressureMaps", true: "Real") -> bytes:
     words += [part for part in parts if isinstance(part, str) and part]
     sections.append(pages.PageSection(parts=tuple(part for part in parts if isinstance(part, Table))))
     return pages.page(f"Resolution of {study.model.design.name}", words, sections).encode()
-
-
-def maps(pressures: "PressureMaps", true: "Real | None" = None) -> bytes:
-    """The heaviest frame's pressures as PNG, the true ones beside them where these are known."""
-    return static.png(figure(pressures, true))
 
 
 def figure(pressures: "PressureMaps", true: "Real | None" = None, name: str = "map", title: str = "") -> Figure:

@@ -1,16 +1,17 @@
 """Figures as data with units: ``static`` draws them as PNG and SVG, ``interactive`` as data for Plotly's script."""
 
 import importlib.util
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import MissingValue
+from sensorgen.core.units import prefix
 
 BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, GREY = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a8f98",
@@ -21,7 +22,6 @@ SYMBOLS = (
     "circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x", "triangle-left", "triangle-right",
 )  # fmt: skip
 MOST_POINTS = 1600  # of a drawn curve: more than a figure is wide
-_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 Values = Sequence[float] | Sequence[str] | Real
 
@@ -198,6 +198,15 @@ class Figure:
     beside: bool = False
     stretch: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
+    @classmethod
+    def by_frequency(
+        cls, key: str, title: str, alt: str, frequency_hz: Iterable[float],
+        panels: Callable[[int, str], Iterable[Panel]], columns: int,
+    ) -> Self:  # fmt: skip
+        """A figure to choose a frequency in, whose panels are made from its number and its name."""
+        choices = {at: tuple(panels(k, at)) for k, at in enumerate(map(frequency, frequency_hz))}
+        return cls(key, title, alt, choices, "frequency", columns)
+
 
 def look(k: int) -> dict[str, str]:
     """Colour and symbol of the k-th curve: no two of the first 81 are alike."""
@@ -219,9 +228,8 @@ def scale(values: Real, unit: str) -> tuple[float, str]:
     >>> scale(np.array([2300.0, -1100.0]), "Ω/mm")
     (1000.0, 'kΩ/mm')
     """
-    largest = float(np.nanmax(np.abs(values), initial=0.0))
-    power = max((p for p in _PREFIXES if largest >= 10.0**p), default=0 if not largest else min(_PREFIXES))
-    return 10.0**power, _PREFIXES[power] + unit
+    name, divisor = prefix(float(np.nanmax(np.abs(values), initial=0.0)))
+    return divisor, name.replace("u", "µ") + unit
 
 
 def frequency(frequency_hz: float) -> str:

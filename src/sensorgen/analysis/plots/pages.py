@@ -7,7 +7,7 @@ inside, compressed; a browser unpacks them.
 import base64
 import gzip
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -146,19 +146,12 @@ def path(region: "Region", height_mm: float) -> str:
     """A region as the data of an SVG path, y upwards from the bottom of the picture [mm]."""
     import shapely
 
-    return "".join(_rings(shapely.simplify(region, _COARSE_MM), height_mm))
-
-
-def _rings(region: "Region", height_mm: float) -> Iterator[str]:
-    import numpy as np
-    import shapely
-
+    from sensorgen.scene.drawing.paper import ViewFrame
     from sensorgen.scene.layers import parts
 
-    for part in parts(region):
-        for ring in (part.exterior, *part.interiors):
-            corners = np.round(shapely.get_coordinates(ring)[:-1], 3)
-            yield "M" + "L".join(f"{x:g} {round(height_mm - y, 3):g}" for x, y in corners.tolist()) + "Z"
+    frame, pieces = ViewFrame(0.0, height_mm, 0.0, 0.0, 1.0, 1.0), parts(shapely.simplify(region, _COARSE_MM))
+    rings = (ring for part in pieces for ring in (part.exterior, *part.interiors))
+    return "".join(frame.outline(shapely.get_coordinates(ring)[:-1].tolist()) for ring in rings)
 
 
 @cache

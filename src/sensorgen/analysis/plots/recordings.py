@@ -4,12 +4,11 @@ Raw and filtered readings with the points before and under each load (thesis Fig
 and position (6.30 to 6.32), and normalised differences of several recordings (6.33).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from sensorgen.analysis.plots import static
 from sensorgen.analysis.plots.figure import (
     BLUE,
     COLOURS,
@@ -21,11 +20,10 @@ from sensorgen.analysis.plots.figure import (
     Figure,
     Map,
     Panel,
-    frequency,
     look,
     scale,
     thinned,
-)  # fmt: skip
+)
 from sensorgen.analysis.plots.pages import PageSection, page
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
@@ -66,9 +64,8 @@ class DrawnRecording:
 
 def series(run: DrawnRecording, key: str = "time") -> Figure:
     """R and X over time at each frequency: raw, filtered, before and under each load."""
-    choices = {}
-    for k, f in enumerate(run.tones_hz):
-        panels = []
+
+    def panels(k: int, at: str) -> Iterator[Panel]:
         for symbol, part in PARTS.values():
             raw, smooth = (getattr(z[:, k], part) for z in (run.raw_ohm, run.filtered_ohm))
             divisor, unit = scale(raw, "Ω")
@@ -78,12 +75,12 @@ def series(run: DrawnRecording, key: str = "time") -> Figure:
                 for name, z, how in (("before", run.pairs.before_ohm, {"colour": GREEN, "symbol": "circle-open"}),
                                      ("pressed", run.pairs.pressed_ohm, {"colour": ORANGE})):  # fmt: skip
                     curves.append(Curve("points", name, run.pairs.time_s, getattr(z[:, k], part) / divisor, **how))
-            panels.append(Panel(tuple(curves), _TIME, Axis(f"{symbol} [{unit}]"), title=frequency(f)))
-        choices[frequency(f)] = tuple(panels)
-    return Figure(
+            yield Panel(tuple(curves), _TIME, Axis(f"{symbol} [{unit}]"), title=at)
+
+    return Figure.by_frequency(
         key, f"Readings over time: {run.name}",
         "R and X over time, as recorded and low-passed. Of long recordings the least and the largest value of every "
-        "stretch are drawn; everything is computed from all samples.", choices, "frequency", columns=2,
+        "stretch are drawn; everything is computed from all samples.", run.tones_hz, panels, columns=2,
     )  # fmt: skip
 
 
@@ -105,19 +102,21 @@ def differences(run: DrawnRecording, part: str, key: str = "") -> Figure:
     BadInput
         As :func:`sensorgen.measure.signal.presses.surface`; no loads.
     """
-    if run.pairs is None:
+    pairs = run.pairs
+    if pairs is None:
         raise BadInput(f"{run.name}: no loads of known force")
-    through, symbol = difference_surface(run.pairs, part), PARTS[part][0]
-    choices = {}
-    for k, f in enumerate(run.tones_hz):
+    through, symbol = difference_surface(pairs, part), PARTS[part][0]
+
+    def panels(k: int, at: str) -> Iterator[Panel]:
         divisor, unit = scale(through.values[..., k], "Ω")
         label = f"Δ{symbol} [{unit}]"
         content = (Map(through.position_mm, through.force_n, through.values[..., k] / divisor, label),
-                   Curve("points", "", run.pairs.position_mm, run.pairs.force_n, colour="#000000"))  # fmt: skip
-        choices[frequency(f)] = (Panel(content, _POSITION, _FORCE, title=f"Δ{symbol} at {frequency(f)}"),)
-    alt = f"Change of {part} over force and position, interpolated between {len(run.pairs.time_s)} loads (dots)."
+                   Curve("points", "", pairs.position_mm, pairs.force_n, colour="#000000"))  # fmt: skip
+        yield Panel(content, _POSITION, _FORCE, title=f"Δ{symbol} at {at}")
+
+    alt = f"Change of {part} over force and position, interpolated between {len(pairs.time_s)} loads (dots)."
     title = f"Change of {part} under load: {run.name}"
-    return Figure(key or part, title, alt, choices, "frequency", columns=4)
+    return Figure.by_frequency(key or part, title, alt, run.tones_hz, panels, columns=4)
 
 
 def compared(
@@ -142,23 +141,23 @@ def compared(
         symbol: normalised([getattr(pairs.difference_ohm, part) for pairs in runs.values()], together=together)
         for symbol, part in PARTS.values()
     }
-    choices = {}
-    for k, f in enumerate(tones_hz):
-        panels = []
+
+    def panels(k: int, at: str) -> Iterator[Panel]:
         for symbol, scaled in parts.items():
             curves = tuple(
                 Curve("points", name, pairs.force_n, values[:, k], **look(j),
                       text=[f"{name}, at {x:.4g} mm" for x in pairs.position_mm])
                 for j, ((name, pairs), values) in enumerate(zip(runs.items(), scaled, strict=True))
             )  # fmt: skip
-            panels.append(Panel(curves, _FORCE, Axis(f"Δ{symbol}, normalised"), title=frequency(f)))
-        choices[frequency(f)] = tuple(panels)
+            yield Panel(curves, _FORCE, Axis(f"Δ{symbol}, normalised"), title=at)
+
     how = "one scale for all" if together else "each recording on a scale of its own"
     alt = (
         f"Change of R and of X by each load of {len(runs)} recordings over its force: 0 is the least and 1 the largest "
         f"change ({how}).{left_out}"
     )
-    return Figure(key, f"Normalised differences under load, {how}", alt, choices, "frequency", columns=2)
+    title = f"Normalised differences under load, {how}"
+    return Figure.by_frequency(key, title, alt, tones_hz, panels, columns=2)
 
 
 def hysteresis(loads: Mapping[float, Hysteresis], tones_hz: Real, name: str) -> Figure:
@@ -173,25 +172,25 @@ def hysteresis(loads: Mapping[float, Hysteresis], tones_hz: Real, name: str) -> 
     name : str
         Of the recording.
     """
-    count, choices = len(tones_hz), {}
-    for k in sorted({0, count - 1}):
-        panels = []
+    ends = sorted({0, len(tones_hz) - 1})
+
+    def panels(k: int, at: str) -> Iterator[Panel]:
         for part, symbol in enumerate("RX"):
-            column = k + part * count
+            column = ends[k] + part * len(tones_hz)
             curves = tuple(
                 Curve("line", "", load.force_n, values[:, column] - load.up[0, column],
                       colour=COLOURS[j % len(COLOURS)], dash=dash)
                 for j, load in enumerate(loads.values()) for values, dash in ((load.up, "solid"), (load.down, "dash"))
             )  # fmt: skip
-            panels.append(Panel(curves, _FORCE, Axis(f"Δ{symbol} [Ω]"), title=f"Δ{symbol} at {frequency(tones_hz[k])}"))
-        choices[frequency(tones_hz[k])] = tuple(panels)
+            yield Panel(curves, _FORCE, Axis(f"Δ{symbol} [Ω]"), title=f"Δ{symbol} at {at}")
+
     title = f"Hysteresis of {name}: rising force solid, falling dashed, a colour for each load"
-    return Figure("hysteresis", title, "Change of R and of X since each load began, over force.", choices, "frequency",
-                  columns=2)  # fmt: skip
+    alt = "Change of R and of X since each load began, over force."
+    return Figure.by_frequency("hysteresis", title, alt, tones_hz[ends], panels, columns=2)
 
 
-def schedule(steps: Sequence[Step], seconds: float) -> bytes:
-    """Plan of a run: force over position in the order of the run, and force over time, as PNG."""
+def schedule(steps: Sequence[Step], seconds: float) -> Figure:
+    """Plan of a run: force over position in the order of the run, and force over time."""
     force, position = np.array([s.force_n for s in steps]), np.array([s.position_mm for s in steps])
     order = Map(position, force, np.arange(1.0, len(steps) + 1), "load")
     edges = [(0.0, 0.0)]
@@ -202,22 +201,7 @@ def schedule(steps: Sequence[Step], seconds: float) -> bytes:
     divisor, unit = (60.0, "min") if seconds > 600 else (1.0, "s")
     when = Curve("line", "", np.array(x) / divisor, y, colour=BLUE)
     panels = (Panel((order,), _POSITION, _FORCE), Panel((when,), Axis(f"time [{unit}]"), _FORCE))
-    return static.png(Figure("plan", f"{len(steps)} loads in {seconds:.0f} s", "The plan.", {"": panels}, columns=2))
-
-
-def over_time(run: DrawnRecording) -> bytes:
-    """Readings over time at each frequency, as PNG."""
-    return static.png(series(run))
-
-
-def surfaces(run: DrawnRecording, part: str) -> bytes:
-    """Change of "resistance" or "reactance" over force and position, at each frequency, as PNG."""
-    return static.png(differences(run, part))
-
-
-def normalised_differences(runs: Mapping[str, Pairs], tones_hz: Real, *, together: bool = False) -> bytes:
-    """Differences of several recordings on one scale from 0 to 1, as PNG."""
-    return static.png(compared(runs, tones_hz, together=together))
+    return Figure("plan", f"{len(steps)} loads in {seconds:.0f} s", "The plan.", {"": panels}, columns=2)
 
 
 def html(run: DrawnRecording) -> str:

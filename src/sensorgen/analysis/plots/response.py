@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Figure, Map, Panel, frequency, look, scale
-from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.core.arrays import Complex, Mask, Real, Whole
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.models.sensor import Sensor
@@ -209,7 +209,6 @@ def lines(frequency_hz: Sequence[float], force_n: Real, position_mm: Real, imped
     over_force = len(force_n) > len(position_mm)
     x, others, unit = (force_n, position_mm, "mm") if over_force else (position_mm, force_n, "N")
     z = impedance_ohm.swapaxes(1, 2) if over_force else impedance_ohm  # the longer axis last
-    which = np.unique(np.linspace(0, len(others) - 1, min(LINES, len(others))).round().astype(int)).tolist()
     panels = []
     for k in sorted({0, len(frequency_hz) - 1}):
         at = frequency(frequency_hz[k])
@@ -217,11 +216,16 @@ def lines(frequency_hz: Sequence[float], force_n: Real, position_mm: Real, imped
             divisor, ohm = scale(part, "Ω")
             curves = tuple(
                 Curve(kind, f"{others[j]:g} {unit}" if kind == "line" else "", x, part[j] / divisor, **look(n))
-                for n, j in enumerate(which) for kind in ("line", "points")
+                for n, j in enumerate(_some(others)) for kind in ("line", "points")
             )  # fmt: skip
             panels.append(Panel(curves, FORCE if over_force else POSITION, Axis(f"{symbol} [{ohm}] at {at}")))
     along = "force" if over_force else "position"
     return Figure("response", f"{name} under load", f"R and X over {along}.", {"": tuple(panels)}, columns=2)
+
+
+def _some(values: Real) -> Whole:
+    """Numbers of some values, from the first to the last, for lines of each."""
+    return np.unique(np.linspace(0, len(values) - 1, min(LINES, len(values))).round().astype(np.int64))
 
 
 def quantity(of: ResponseMap, name: str) -> Figure:
@@ -232,17 +236,18 @@ def quantity(of: ResponseMap, name: str) -> Figure:
     """
     about, values = QUANTITIES[name], of.values(name)
     loaded = np.ix_(of.force_n >= 0, of.on_sensor())
-    choices = {}
-    for k, f in enumerate(of.frequency_hz):
+
+    def panels(k: int, at: str) -> Iterator[Panel]:
         divisor, unit = scale(values[k][loaded], about.unit)
         shown = values[k] / divisor
         low, high = np.percentile(shown[loaded], (2, 98) if "-by-" in name else (0, 100)).tolist()
         label = f"{about.symbol} [{unit}]"
         plain = Map(of.position_mm, of.force_n, shown, label, low, high)
         content = (replace(plain, levels=_levels(*plain.span)),)
-        choices[frequency(f)] = (Panel(content, POSITION, FORCE, title=f"{label} at {frequency(f)}"),)
+        yield Panel(content, POSITION, FORCE, title=f"{label} at {at}")
+
     alt = f"{about.title}, over force and position; the colours span positions where the whole tip rests on the sensor."
-    return Figure(name, about.title, alt, choices, "frequency", columns=4)
+    return Figure.by_frequency(name, about.title, alt, of.frequency_hz, panels, columns=4)
 
 
 def _levels(low: float, high: float, count: int = 7) -> tuple[float, ...]:
@@ -262,12 +267,9 @@ def inverse(of: ResponseMap, which: str) -> Figure:
     """
     unit = {"position": "mm", "force": "N"}[which]
     colour = np.broadcast_to(of.position_mm if which == "position" else of.force_n[:, None], of.folds().shape[1:])
-    forces, positions = (
-        np.unique(np.linspace(0, len(v) - 1, min(LINES, len(v))).round().astype(int))
-        for v in (of.force_n, of.position_mm)
-    )
-    choices = {}
-    for k, f in enumerate(of.frequency_hz):
+    forces, positions = _some(of.force_n), _some(of.position_mm)
+
+    def panels(k: int, at: str) -> Iterator[Panel]:
         r, x = of.values("resistance")[k], of.values("reactance")[k]
         (r_divisor, r_unit), (x_divisor, x_unit) = scale(r, "Ω"), scale(x, "Ω")
         r, x = r / r_divisor, x / x_divisor
@@ -278,9 +280,8 @@ def inverse(of: ResponseMap, which: str) -> Figure:
             *(Curve("line", "", r[:, i], x[:, i], colour="#000000", dash="dash") for i in positions),
             *([Curve("points", "", r[folded], x[folded], colour="#ff0000")] if folded.any() else []),
         )
-        choices[frequency(f)] = (
-            Panel(content, Axis(f"R [{r_unit}]"), Axis(f"X [{x_unit}]"), title=frequency(f)),
-        )  # fmt: skip
+        yield Panel(content, Axis(f"R [{r_unit}]"), Axis(f"X [{x_unit}]"), title=at)
+
     folds = "; red: folds" if of.folds().any() else ""
     solid, dashed = (
         ", ".join(f"{v:.3g}" for v in values) for values in (of.force_n[forces], of.position_mm[positions])
@@ -289,7 +290,7 @@ def inverse(of: ResponseMap, which: str) -> Figure:
     alt = (
         f"{which.capitalize()} in colours over R and X. Lines of constant force are solid, of constant position dashed."
     )
-    return Figure(f"inverse-{which}", title, alt, choices, "frequency", columns=4)
+    return Figure.by_frequency(f"inverse-{which}", title, alt, of.frequency_hz, panels, columns=4)
 
 
 def figures(of: ResponseMap) -> Iterator[Figure]:

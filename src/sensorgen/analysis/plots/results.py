@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sensorgen.analysis.plots import static
 from sensorgen.analysis.plots.figure import BLUE, COLOURS, ORANGE, Axis, Curve, Figure, Map, Panel, look, scale
 from sensorgen.checks.review import Review
 from sensorgen.core.document import Cell, Table
@@ -153,8 +152,8 @@ def compression_figure(result: CompressionResult) -> Figure:
 _LEAST = 1 / 30  # of the error without information, at which the colours begin
 
 
-def sheet_png(film: "Sheet", bounds: Mapping[str, "PressErrors"], ports: Mapping[str, Sequence["Port"]]) -> bytes:
-    """Standard errors of x and y over the sheet, one column per set of contacts, as PNG.
+def sheet(film: "Sheet", bounds: Mapping[str, "PressErrors"], ports: Mapping[str, Sequence["Port"]]) -> Figure:
+    """Standard errors of x and y over the sheet, one column per set of contacts.
 
     The colours end at the error without a reading: of a uniform distribution over the sheet.
 
@@ -166,16 +165,11 @@ def sheet_png(film: "Sheet", bounds: Mapping[str, "PressErrors"], ports: Mapping
         By the name of the set of contacts.
     ports : mapping of str to sequence of Port
         The contacts of each set.
-
-    Raises
-    ------
-    MissingValue
-        Matplotlib is not installed.
     """
     panels = tuple(_port_panel(film, name, bounds[name], ports[name], row) for row in (0, 1) for name in bounds)
     title = "Standard error of a load's position, outline known; contacts red; scale up to the error without a reading"
     alt = "Standard errors of x above and of y below, over the sheet, one column per set of contacts."
-    return static.png(Figure("sheet", title, alt, {"": panels}, columns=len(bounds)))
+    return Figure("sheet", title, alt, {"": panels}, columns=len(bounds))
 
 
 def _port_panel(film: "Sheet", name: str, bounds: "PressErrors", ports: Sequence["Port"], row: int) -> Panel:

@@ -17,13 +17,13 @@ from markupsafe import Markup
 from sensorgen.analysis.plots import layers, pages
 from sensorgen.asprinted.printed import Printed
 from sensorgen.checks.review import Review, draw
-from sensorgen.core.arrays import Whole
 from sensorgen.core.document import Part
 from sensorgen.core.findings import headline
 from sensorgen.prediction.identifiability.results import GUESS, Identifiability, Rows, metres, newtons
 from sensorgen.prediction.results import Changes, Prediction, Term
+from sensorgen.scene.drawing.paper import ViewFrame
 from sensorgen.scene.drawing.view import View, views
-from sensorgen.scene.geometry.meshes import Mesh, mesh
+from sensorgen.scene.geometry.meshes import mesh
 from sensorgen.scene.scene import AXES, Outline, Scene, clipped
 
 UM_PER_MM = 1000
@@ -94,14 +94,9 @@ def _figure(
 
 
 def _paths(outlines: dict[str, list[Outline]], names: Sequence[str], height_mm: float) -> Iterator[tuple[int, str]]:
+    frame = ViewFrame(0.0, height_mm, 0.0, 0.0, 1.0, 1.0)
     for name, each in outlines.items():
-        yield (
-            names.index(name),
-            "".join(
-                "M" + "L".join(f"{round(u, 4):g} {round(height_mm - z, 4):g}" for u, z in outline) + "Z"
-                for outline in each
-            ),
-        )
+        yield names.index(name), "".join(map(frame.outline, each))
 
 
 def block(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequence[str]) -> bytes:
@@ -112,7 +107,11 @@ def block(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequenc
         bodies = {body.name: body for body in scene.bodies}
         counts[kind] = []
         for name in names:
-            parts = _parts(mesh(bodies[name])) if name in bodies else (np.empty((0, 3), np.int64),) * 3
+            parts = (np.empty((0, 3), np.int64),) * 3
+            if name in bodies:
+                shell = mesh(bodies[name])
+                um = np.round(shell.vertices_mm * UM_PER_MM).astype(np.int64)
+                parts = um, shell.triangles.astype(np.int64), shell.sharp_edges()  # the edges between faces
             counts[kind].append([len(part) for part in parts])
             vertices, triangles, ends = parts
             steps = (np.diff(vertices, axis=0, prepend=0), np.diff(triangles.ravel(), prepend=0),
@@ -121,12 +120,6 @@ def block(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequenc
     head = json.dumps({**header, "counts": counts}, separators=(",", ":"), allow_nan=False).encode()
     head += b" " * (-len(head) % 4)
     return b"".join([len(head).to_bytes(4, "little"), head, *blocks])
-
-
-def _parts(shell: Mesh) -> tuple[Whole, Whole, Whole]:
-    """Vertices [um], triangles, and the edges between faces."""
-    vertices = np.round(shell.vertices_mm * UM_PER_MM).astype(np.int64)
-    return vertices, shell.triangles.astype(np.int64), shell.sharp_edges()
 
 
 _SEEN = 0.1  # per cent: smaller effects are left out

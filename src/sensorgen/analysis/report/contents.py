@@ -343,4 +343,15 @@ def as_json(report: Report) -> Iterator[str]:
     yield "\n"
 
 
-WRITERS = {"html": html, "md": markdown, "csv": comma_separated, "json": as_json}
+def pieces(content: Report, how: str) -> Iterator[str]:
+    """A report as pieces of text, one after the other; ``how`` is one of ``FORMATS``."""
+    return _WRITERS[how](content)
+
+
+def written(content: Report, how: str) -> str:
+    """A report as text; parameters as :func:`pieces`."""
+    return "".join(pieces(content, how))
+
+
+_WRITERS = {"html": html, "md": markdown, "csv": comma_separated, "json": as_json}
+FORMATS = tuple(_WRITERS)

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from math import comb, nan
 from statistics import geometric_mean, median
 from typing import Annotated
@@ -93,12 +92,7 @@ def rank_p(one: Sequence[float], other: Sequence[float]) -> float:
     >>> round(rank_p([0.68, 0.6, 0.63, 0.67, 0.68], [0.36, 0.435, 0.5, 0.5, 0.45]), 6)  # 2 of 252
     0.007937
     """
-    from scipy.stats import mannwhitneyu, rankdata
+    from scipy.stats import PermutationMethod, mannwhitneyu
 
-    count, total = len(one), len(one) + len(other)
-    if comb(total, count) > _ORDERS:
-        return float(mannwhitneyu(one, other, method="asymptotic").pvalue)
-    ranks: list[float] = rankdata([*one, *other]).tolist()
-    seen, sums = sum(ranks[:count]), [sum(some) for some in combinations(ranks, count)]  # of halves: exact
-    tail: int = min(sum(value <= seen for value in sums), sum(value >= seen for value in sums))
-    return min(1.0, 2 * tail / len(sums))
+    exact = comb(len(one) + len(other), len(one)) <= _ORDERS
+    return float(mannwhitneyu(one, other, method=PermutationMethod(_ORDERS) if exact else "asymptotic").pvalue)

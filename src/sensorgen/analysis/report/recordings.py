@@ -176,13 +176,10 @@ def figures(recorded: Sequence[RecordedRun]) -> Iterator[Figure]:
     for run in recorded:
         part = f"-{run.source.part}" if run.source.part else ""
         key = f"{run.entry.number}-{run.source.lockin}{part}"
-        one = plots.DrawnRecording(
-            run.name, run.tones_hz, run.time_s, run.raw_ohm, run.filtered_s, run.filtered_ohm, run.pairs
-        )  # fmt: skip
-        yield plots.series(one, f"series-{key}")
+        yield plots.series(run, f"series-{key}")
         for part in plots.PARTS:
             try:
-                yield plots.differences(one, part, f"{part}-{key}")
+                yield plots.differences(run, part, f"{part}-{key}")
             except SensorgenError:  # no loads, or all on one line: there is no surface
                 continue
 

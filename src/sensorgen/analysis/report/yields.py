@@ -164,8 +164,8 @@ def notes(comparison: Comparison) -> tuple[str, ...]:
     """Notes on the rules of verdicts and counts."""
     how = (
         "The verdict is the gravest of the electrode's and the film's. An electrode is compared with its prediction "
-        "times the median of measured over predicted of its shape, within the predicted range. A film resistance up to "
-        "that of two electrodes in series is a short. A film is intact from "
+        "times the median of measured over predicted of its shape's readings within their predicted ranges, if any. "
+        "A film resistance up to that of two electrodes in series is a short. A film is intact from "
         f"{REACTANCES:g} times its predicted reactance at {TONES_HZ[0] / 1e3:g} kHz on, where a leak changes the "
         f"impedance by {50 / REACTANCES**2:g} %, or from the meter's highest range on; between, it leaks."
     )
@@ -269,4 +269,4 @@ def _shares(known: Sequence[Group]) -> Iterator[Figure]:
     )  # fmt: skip
     panel = Panel((curve,), Axis("share [%]", low=0.0, high=102.0), Axis(names=names))
     alt = f"Share of specimens whose film resistance is at most {ORDER:g} times the electrode's, with exact intervals."
-    yield Figure("shorted", "Shorted or leaking, by shape and film", alt, {"": (panel,)})
+    yield Figure("shorted", "Low film resistance, by shape and film", alt, {"": (panel,)})

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import dist
 
 import shapely
 
@@ -149,6 +150,30 @@ def partition(bodies: Mapping[Region, shapely.Geometry], whole: shapely.Polygon,
     left, _, right, _ = (round(v, _DIGITS) for v in whole.bounds)
     kept = {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
     return ContactCell(kept, regions, left, right, mirrored=True, turned=turned)
+
+
+def joined(edges: Mapping[Edge, tuple[int, int]]) -> dict[Edge, tuple[int, int]]:
+    """Edges of which those that continue each other in a straight line are one; else a mesh is fine there, too."""
+    whole, at = dict(edges), dict[Point, list[Edge]]()
+    for edge in whole:
+        for place in edge:
+            at.setdefault(place, []).append(edge)
+    for here in at.values():
+        if len(here) != 2 or whole[here[0]] != whole[here[1]] or not _in_line(*sorted(here)):
+            continue
+        (a, b), (c, d) = sorted(here)
+        whole[a, d] = whole.pop((a, b))
+        del whole[c, d]
+        for end, old in ((a, (a, b)), (d, (c, d))):
+            at[end].remove(old)
+            at[end].append((a, d))
+    return whole
+
+
+def _in_line(first: Edge, second: Edge) -> bool:
+    """Test whether the second of two edges begins where the first ends, in its direction."""
+    (a, b), (c, d) = first, second
+    return b == c and abs((b[0] - a[0]) * (d[1] - c[1]) - (b[1] - a[1]) * (d[0] - c[0])) <= _SLIVER_MM * dist(a, d)
 
 
 def _add(edges: dict[Edge, tuple[int, int]], a: Point, b: Point, sides: tuple[int, int]) -> None:

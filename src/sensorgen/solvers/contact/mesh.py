@@ -11,7 +11,7 @@ from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Point
 from sensorgen.solvers.contact import mesher
-from sensorgen.solvers.contact.cell import BLOCK, OUTSIDE, ContactCell, Edge
+from sensorgen.solvers.contact.cell import BLOCK, OUTSIDE, ContactCell, Edge, joined
 from sensorgen.solvers.contact.element import TRIANGLE, ElementMesh
 
 Run = tuple[int, int]
@@ -98,17 +98,20 @@ def pinches(cell: ContactCell) -> set[Point]:
 class Fineness:
     """Sizes of triangles: where solids meet in one point, at the other ends of gaps, and far from both [mm].
 
-    ``growth`` is by how much the size grows per distance [-].
+    ``growth`` is by how much the size grows per distance [-]. ``straight`` takes edges that continue each other as one:
+    a cell is cut wherever one of its outlines turns, and pieces of the others there make a mesh fine far from it.
     """
 
     apex_mm: float = 1e-3
     corner_mm: float = 0.05
     coarse_mm: float = 0.15
     growth: float = 0.5
+    straight: bool = False
 
     def scaled(self, factor: float) -> "Fineness":
         """Every length and the growth times a factor."""
-        return Fineness(*(factor * value for value in (self.apex_mm, self.corner_mm, self.coarse_mm, self.growth)))
+        names = "apex_mm", "corner_mm", "coarse_mm", "growth"
+        return replace(self, **{name: factor * getattr(self, name) for name in names})
 
     def finer(self) -> "Fineness":
         """The next level."""
@@ -121,6 +124,8 @@ def mesh_of(cell: ContactCell, fineness: Fineness) -> TriangleMesh:
     The edges are cut here, because a mesher that smooths its sizes forgets the small ones at an apex.
     """
     sharp = pinches(cell)
+    if fineness.straight and not sharp:
+        cell = replace(cell, edges=joined(cell.edges))
     faces = [
         e for e, sides in cell.edges.items() if OUTSIDE not in sides and cell.solid(sides[0]) != cell.solid(sides[1])
     ]

@@ -1,7 +1,6 @@
 """The thesis, reproduced: every numbered equation, table and figure with its value, ours, and a verdict."""
 
-from sensorgen.verification.thesis.markdown import markdown
-from sensorgen.verification.thesis.page import html, plain
+from sensorgen.verification.thesis.documents import html, markdown, plain
 from sensorgen.verification.thesis.reproduced import ReproducedItem, rows
 
 __all__ = ["ReproducedItem", "html", "markdown", "plain", "rows"]

@@ -1,6 +1,6 @@
 """All numbered items of the thesis, computed anew and judged."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,9 +63,7 @@ def row(of_chapter: str, kind: Kind, item: ThesisItem) -> ReproducedItem:
     return ReproducedItem(of_chapter, kind, item, parts, verdict)
 
 
-def _computed(check: str, given: Mapping[str, Any]) -> list[ItemPart]:
+def _computed(check: str, given: Mapping[str, Any]) -> Iterable[ItemPart]:
     name, _, check = check.partition(".")
-    module = registry.load(checks, name)
-    work = getattr(module, "EQUATIONS", {}).get(check) or getattr(module, check)
-    parts: list[ItemPart] = work(**given)
+    parts: Iterable[ItemPart] = getattr(registry.load(checks, name), check)(**given)
     return parts

@@ -1,6 +1,6 @@
 """Verdicts on numbers of the thesis, by our own."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import floor, log10
 from typing import Any
@@ -80,6 +80,9 @@ class ItemPart:
         size = max(float(np.max(abs(ours))), self.scale)
         far = float(np.max(abs(other - ours)))
         return far / size if size else (0.0 if far == 0 else np.inf)
+
+
+Parts = Iterator[ItemPart]
 
 
 @dataclass(frozen=True)

@@ -1,28 +1,34 @@
 """Print batches: a plan of designs and copies becomes one plate, with a record of what lies where."""
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
+from shutil import rmtree
 
+from sensorgen.asprinted import agreement
+from sensorgen.asprinted import printed as asprinted
 from sensorgen.checks.review import Review, Step
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
-from sensorgen.core.errors import BadInput, OutOfRange, Unprintable
+from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, Unprintable
 from sensorgen.core.findings import headline
 from sensorgen.core.parallel import remembered
 from sensorgen.design.design import Design
-from sensorgen.export import threemf
-from sensorgen.export.slicers import TIME_LIMIT_S
+from sensorgen.export import slicing, threemf
+from sensorgen.export.gcode.check import check_motion
+from sensorgen.export.slicers import TIME_LIMIT_S, curaengine
+from sensorgen.export.slicers.versions import parse
+from sensorgen.export.slicing import Placed, Sliced
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless
 from sensorgen.prediction.slices import reviewed
-from sensorgen.workflows.batch import labelling, layout, printing, record
+from sensorgen.workflows.batch import labelling, layout, record
 from sensorgen.workflows.batch.layout import Plate, Room, Size, column, packed, room
 from sensorgen.workflows.batch.plan import BatchPlan, PrintPiece, load, pieces, shuffled, texts, tools
-from sensorgen.workflows.batch.record import BatchRecord, ResolvedDesign, SlicedPlate
+from sensorgen.workflows.batch.record import BatchRecord, PrintedDesign, ResolvedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes, versions
 
 STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "as printed", "record", "done")
@@ -193,14 +199,14 @@ def make(
     with store.staging(folder) as stage:
         step("3MF")
         store.write(stage, {"plan.yaml": path.read_bytes()})
-        on_plate = printing.placed(placed.plan, placed.pieces, placed.plate)
+        on_plate = _on_plate(placed.plan, placed.pieces, placed.plate)
         slicers = placed.plan.slicers if gcode else ()
         sliced_from = {"prusa"} & set(slicers)  # slicing leaves the 3MF that it took; CuraEngine takes none
         families = [family for family in threemf.FAMILIES if family not in sliced_from]
-        for name, content in (*printing.threemfs(placed.plan.name, on_plate, families), *_files(placed, log_head)):
+        for name, content in (*_threemfs(placed.plan.name, on_plate, families), *_files(placed, log_head)):
             store.write(stage, {name: content})
         sliced: dict[str, SlicedPlate] = {
-            s: printing.gcode(placed.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers
+            s: _gcode(placed.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers
         }
         step("record")
         batch = _record(placed, predicted, sliced, stage).sealed()
@@ -216,6 +222,96 @@ def _refuse_unprintable(placed: Arranged, reviews: Mapping[str, Review], *, forc
         every = [f for key in wrong for f in reviews[key].findings]
         stopping = [f for key in wrong for f in reviews[key].errors(strict)]
         raise Unprintable(every, stopping).within(placed.designs[wrong[0]].name)
+
+
+def _on_plate(plan: BatchPlan, pieces: Sequence[PrintPiece], plate: Plate) -> list[Placed]:
+    """The specimens of a plate as slicing knows them, each with its tab where the plan wants them."""
+    return [
+        Placed(
+            pieces[number].design, place.centre_mm, pieces[number].name,
+            labelling.bodies(pieces[number].design, pieces[number].name) if plan.labels.tab else (),
+        )
+        for number, place in plate.items()
+    ]  # fmt: skip
+
+
+def _threemfs(name: str, plate: Sequence[Placed], families: Sequence[str]) -> Iterator[tuple[str, bytes]]:
+    """Name and content of the 3MF of a plate called ``name``, for some families of slicers."""
+    for family in families:
+        yield f"{name}.{family}.3mf", slicing.plate_3mf(plate, family, name)
+
+
+def _gcode(
+    name: str, plate: Sequence[Placed], slicer: str, folder: Path, time_limit_s: float, step: Step
+) -> SlicedPlate:
+    """Slice a plate into ``folder``, and say by what; the 3MF on record is the one that PrusaSlicer took.
+
+    Parameters
+    ----------
+    name : str
+        Of the batch; ``<name>.<slicer>.gcode`` is for the printer, ``<name>.<slicer>.refused.gcode`` has errors.
+    plate : sequence of Placed
+        The specimens.
+    slicer : str
+        ``prusa`` or ``cura``.
+    folder : Path
+        Of the batch; the slicer's own G-code and its settings go to a folder of its name in there.
+    time_limit_s : float
+        How long the slicer may take [s].
+    step : callable
+        Called repeatedly while the slicer works.
+    """
+    machine = plate[0].design.machine
+    inside, own, ready = folder / f".{slicer}", folder / slicer, folder / f"{name}.{slicer}.gcode"
+    sliced = slicing.sliced(
+        plate, slicer, inside, title=name, time_limit_s=time_limit_s, step=lambda _: step("slicing")
+    )
+    own.mkdir()
+    sliced.raw.replace(own / "raw.gcode")
+    sliced.ready.replace(ready)
+    if slicer == "prusa":
+        (inside / "plate.3mf").replace(folder / f"{name}.prusa.3mf")
+        settings = "profile.ini"
+        (inside / settings).replace(own / settings)
+    else:
+        settings = "settings.json"
+        engine = curaengine.engine_settings(
+            machine, plate[0].design.layers, slicing.plate_loads(plate), parse(sliced.version)
+        )
+        store.write(own, {settings: json_bytes(asdict(engine))})
+    rmtree(inside)  # what is left are the bodies again, as the slicer took them
+    loaded = tools(piece.design for piece in plate)
+    checked = check_motion(
+        sliced.lifted.motion, machine, loaded, others_empty=True, texts=texts(p.design for p in plate)
+    )
+    for piece in plate:
+        checked = checked.with_more(
+            agreement.check(piece.design, sliced.lines, sliced.lifted.motion, piece.sensor_mm(), piece=piece.name)
+        )
+    if checked.errors():
+        ready = ready.replace(ready.with_suffix(".refused.gcode"))
+    step("as printed")
+    firsts: dict[str, Placed] = {}
+    for piece in plate:
+        firsts.setdefault(piece.design.id(), piece)  # it stands for its copies, which the same slicer cuts alike
+    content = ready.read_bytes()
+    return SlicedPlate(
+        **vars(checked), version=sliced.version, gcode=ready.name, raw=f"{slicer}/raw.gcode",
+        profile=f"{slicer}/{settings}",
+        printed={key: _printed(piece, sliced, content) for key, piece in firsts.items()},
+    )  # fmt: skip
+
+
+def _printed(piece: Placed, sliced: Sliced, content: bytes) -> PrintedDesign:
+    """The print of a specimen, from the G-code of its plate."""
+    design, source = piece.design, f"{sliced.slicer} {sliced.version}"
+    try:
+        printed = asprinted.body(design, sliced.lines, slicer=source, centre_mm=piece.sensor_mm())
+        body = bodies.sliced(design, lambda: printed, source, content + piece.name.encode())
+        layers, findings = tuple(printed.rows), (*sliced.findings, *printed.findings())
+        return PrintedDesign(piece.name, design.name, timeless(evaluate(body)), layers, findings)
+    except SensorgenError as error:
+        return PrintedDesign(piece.name, design.name, reason=str(error))
 
 
 def _files(placed: Arranged, log_head: str) -> Iterator[tuple[str, bytes]]:

@@ -11,28 +11,19 @@ Letters on a tab are made of squares wider than a printed line, so that every st
 the dielectric and touches the sensor with its edge alone.
 """
 
-import html
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
+from markupsafe import Markup
+
+from sensorgen.analysis.plots import pages
 from sensorgen.core.errors import BadInput, MissingValue
 from sensorgen.design.design import Design
 from sensorgen.scene.lettering import FONT, LINE_DOTS, dots, runs
 from sensorgen.scene.scene import Body, Prism, box
 from sensorgen.workflows.batch.plan import PrintPiece
-
-_STYLE = """
-@page { size: A4; margin: 10mm }
-body { margin: 0; font: 10pt/1.25 system-ui, sans-serif; color: #000; background: #fff }
-main { display: grid; grid-template-columns: repeat(2, 90mm); gap: 1.5mm 4mm }
-section { display: flex; gap: 3mm; align-items: center; height: 25mm; width: 90mm; box-sizing: border-box;
-          border: 0.2mm dashed #777; padding: 1.5mm; break-inside: avoid; overflow: hidden }
-svg { width: 22mm; height: 22mm; flex: none }
-h2 { font-size: 12pt; margin: 0 0 1mm; overflow-wrap: anywhere }
-p { margin: 0; font-size: 8pt; overflow-wrap: anywhere }
-h1 { font-size: 11pt; margin: 0 0 3mm }
-"""
 
 
 @dataclass(frozen=True)
@@ -84,22 +75,10 @@ def page(labels: Iterable[Label], title: str) -> str:
     MissingValue
         The library for QR codes is not installed.
     """
-    head = f'<meta charset="utf-8"><title>{html.escape(title)}: labels</title><style>{_STYLE}</style>'
-    body = "".join(map(_section, labels))
-    return (
-        f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body><h1>{html.escape(title)}</h1>\n'
-        f"<main>{body}\n</main></body></html>\n"
-    )
+    return pages.render("sensorgen.workflows.batch", "labels.html", title=title, labels=labels, qr=_qr)
 
 
-def _section(label: Label) -> str:
-    log_head = f"log {label.log_head[:16]}" if label.log_head else ""
-    lines = (f"no. {label.place} on the plate of {label.batch}", label.design, f"design {label.design_id}", log_head)
-    text = "".join(f"<p>{html.escape(line)}</p>" for line in lines if line)
-    return f"\n<section>{_qr(label.code)}<div><h2>{html.escape(label.name)}</h2>{text}</div></section>"
-
-
-def _qr(text: str) -> str:
+def _qr(text: str) -> Markup:
     """A QR code as SVG; error correction M bears a scratch or a stain."""
     try:
         import segno
@@ -107,7 +86,8 @@ def _qr(text: str) -> str:
         raise MissingValue(
             "QR codes need the library segno: pip install segno, or set 'labels: {sheet: false}' in the plan"
         ) from None
-    return str(segno.make(text, error="m", micro=False).svg_inline(border=4, omitsize=True))
+    svg = segno.make(text, error="m", micro=False).svg_inline(border=4, omitsize=True)
+    return Markup(svg)  # noqa: S704 - of squares alone
 
 
 PLATE_MM = 0.6
@@ -181,12 +161,11 @@ def _lines(name: str, width_dots: float) -> list[str]:
     if lacking:
         raise BadInput(f"no letter {lacking[0]!r} for the tab of {name!r}; expected {''.join(sorted(FONT))}")
     most = int((width_dots - 2 * MARGIN_DOTS + 1 + 1e-9) // (LINE_DOTS + 1))
-    choices = [_broken(words, limit) for limit in sorted({dots(" ".join(words[a:b])) for a, b in _spans(len(words))})]
+    choices = [
+        _broken(words, limit)
+        for limit in sorted({dots(" ".join(words[a:b])) for a, b in combinations(range(len(words) + 1), 2)})
+    ]
     return next((lines for lines in choices if lines and len(lines) <= most), [])
-
-
-def _spans(count: int) -> Iterator[tuple[int, int]]:
-    return ((a, b) for a in range(count) for b in range(a + 1, count + 1))
 
 
 def _broken(words: Sequence[str], limit: int) -> list[str]:

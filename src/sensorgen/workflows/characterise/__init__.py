@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -18,10 +19,12 @@ from sensorgen.analysis.characterise.catalogue import (
     targets,
     unknowns,
 )
-from sensorgen.analysis.characterise.posterior import physical, posterior, prior
+from sensorgen.analysis.characterise.posterior import CouponPosterior, Interval95, physical, posterior, prior
+from sensorgen.analysis.plots.figure import BLUE, Axis, Curve, Figure, Panel
+from sensorgen.analysis.plots.static import files
 from sensorgen.checks.review import Step
 from sensorgen.core import files as store
-from sensorgen.core.document import Facts, Part, Table
+from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError
 from sensorgen.core.version import __version__
 from sensorgen.design import materials, packs
@@ -33,7 +36,6 @@ from sensorgen.prediction.inference import Parameter
 from sensorgen.workflows.build import json_bytes, profiles, versions
 from sensorgen.workflows.characterise import form as forms
 from sensorgen.workflows.characterise import plate as plates
-from sensorgen.workflows.characterise.intervals import IntervalRow, compared, svg
 
 STEPS = ("catalogue", "selection", "3MF", "profiles", "picture", "done")
 FORM = "form.yaml"
@@ -146,7 +148,8 @@ class Study:
             flows.append(made.speed_mm_s * made.line_mm * layers.layer_mm)
         lines = plates.lines_bodies(self.design, self.conductor, self.dielectric)
         volume = sum(c.volume_mm3 for c in chosen) + sum(body.volume_mm3() for body in lines)
-        tallest = max((_height_mm(c) for c in chosen), default=0.0)
+        heights = (s.drawn for c in chosen for s in c.sizes if s.key.startswith(("height_", "film_")))
+        tallest = max(heights, default=0.0)
         return (_SLOWER * volume / min(flows) + _CHANGE_S * tallest / layers.layer_mm) / 3600
 
 
@@ -155,9 +158,86 @@ def _beside(word: str) -> str:
     return f"./{Path(word).name}" if packs.is_path("printers", word) else word
 
 
-def _height_mm(coupon: Coupon) -> float:
-    keys = [s.drawn for s in coupon.sizes if s.key.startswith(("height_", "film_"))]
-    return max(keys)
+_DETERMINED = 0.5  # of an interval before, below which one after counts as measured
+_LEAST = 0.01  # of the value: what is drawn at the least
+
+
+@dataclass(frozen=True)
+class IntervalRow:
+    """A target before and after.
+
+    Attributes
+    ----------
+    quantity, material : str
+        As a material's file has them.
+    value, low, high : float
+        Afterwards: median and 95 % interval.
+    half_width, goal : float
+        Half of the interval, relative to the value, and what is wanted [%].
+    before_low, before_high : float
+        The 95 % interval before.
+    """
+
+    quantity: Annotated[str, Column("quantity")]
+    material: Annotated[str, Column("material")]
+    before_low: Annotated[float, Column("before", digits=2)]
+    before_high: Annotated[float, Column("to", digits=2)]
+    value: Annotated[float, Column("after", digits=3)]
+    low: Annotated[float, Column("low", digits=3)]
+    high: Annotated[float, Column("high", digits=3)]
+    half_width: Annotated[float, Column("+-", "%", digits=2)]
+    goal: Annotated[float, Column("goal", "%", digits=2)]
+    title: Annotated[str, Column("meaning", hidden=True)]
+
+    def determined(self) -> bool:
+        """Test whether the readings say more than what was known before."""
+        return self.high - self.low < _DETERMINED * (self.before_high - self.before_low)
+
+
+def compared(
+    before: CouponPosterior, after: CouponPosterior, wanted: Sequence[CouponTarget]
+) -> tuple[IntervalRow, ...]:
+    """All targets, with their intervals before and after."""
+
+    def row(target: CouponTarget, was: Interval95, now: Interval95) -> IntervalRow:
+        goal = 100 * target.goal if target.goal else np.nan
+        half = 100 * now.half_width() if target.goal else np.nan
+        return IntervalRow(target.quantity, target.material, was.low, was.high, now.value, now.low, now.high, half,
+                           goal, target.title)  # fmt: skip
+
+    return tuple(row(target, before.interval(target), after.interval(target)) for target in wanted)
+
+
+def svg(title: str, rows: Sequence[IntervalRow]) -> str:
+    """Intervals before and after as a picture, relative to the value after; those that reach 0 are left out.
+
+    Parameters
+    ----------
+    title : str
+        Above the bars.
+    rows : sequence of IntervalRow
+        In the order of reading.
+    """
+    shown = [row for row in rows if row.low > 0 and row.before_low > 0]
+    names, ones = [_label(row) for row in shown], [1.0] * len(shown)
+    before, after = (
+        [[max(getattr(row, end) / row.value, _LEAST) for row in shown] for end in ends]
+        for ends in (("before_low", "before_high"), ("low", "high"))
+    )
+    curves = (
+        Curve("ranges", "before", ones, names, before[0], before[1]),
+        Curve("points", "after", ones, names, after[0], after[1], colour=BLUE),
+    )
+    panel = Panel(curves, Axis("times the value after, 95 % intervals", log=True), Axis(names=tuple(names)))
+    figure = Figure("intervals", title, title, {"": (panel,)})
+    return next(content for name, content in files(figure) if name.endswith(".svg")).decode()
+
+
+def _label(row: IntervalRow) -> str:
+    """Quantity of a material with its value, as a label."""
+    half = (row.high - row.low) / 2 / row.value
+    words = f"{row.value:.3g} +- {100 * half:.2g} %" if row.determined() else "not determined"
+    return f"{row.quantity} of {row.material}: {words}"
 
 
 @dataclass(frozen=True)

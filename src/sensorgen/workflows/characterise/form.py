@@ -6,21 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import BeforeValidator, Field
 
-from sensorgen.analysis.characterise.catalogue import Coupon, CouponSize, Meters
+from sensorgen.analysis.characterise.catalogue import Coupon, CouponReading, CouponSize, Meters
 from sensorgen.analysis.characterise.posterior import Observation
 from sensorgen.core import yamlfile
-from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
-from sensorgen.core.records import shown
+from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName, within
+from sensorgen.core.records import Strict, checked, shown
 from sensorgen.core.units import FORCE_N, LENGTH_MM, M_PER_MM, NUMBER, Quantity
 from sensorgen.models.coupons import secant_stiffening
 from sensorgen.workflows.characterise.plate import COMBS, FILMS, STEP_MM, WALLS
 
 LINES = "lines"
-_HEAD = ("plate", "printer", "quality", "conductor", "dielectric", "tools", "meters", "coupons")
 _UNITS = {
     "mm": LENGTH_MM,
     "n": FORCE_N,
@@ -29,7 +29,8 @@ _UNITS = {
     "pf": Quantity("capacitance", {u: Decimal(v) for u, v in
                                    (("pF", "1"), ("fF", "1e-3"), ("nF", "1e3"), ("uF", "1e6"), ("F", "1e12"))}),
 }  # fmt: skip
-_PERCENT = {"resistance_percent": "resistance", "capacitance_percent": "capacitance", "force_percent": "force"}
+Name = Annotated[str, Field(min_length=1)]
+_given = BeforeValidator(lambda value: {} if value is None else value)  # ~ is as good as an empty mapping
 _SIZES, _DEFECT = 3.0, 1e5  # by which a size, a reading of a dead coupon, may differ from what is expected
 
 
@@ -53,8 +54,7 @@ class LineReadings:
     combs_short: tuple[bool | None, ...]
 
 
-@dataclass(frozen=True)
-class Form:
+class Form(Strict):
     """A form as read, before its names are looked up.
 
     Attributes
@@ -69,14 +69,14 @@ class Form:
         Fields by coupon.
     """
 
-    plate: str
-    printer: str
-    quality: str
-    conductor: str
-    dielectric: str
-    tools: Mapping[str, int]
-    meters: Meters
-    coupons: Mapping[str, Mapping[str, Any]]
+    plate: Name
+    printer: Name
+    quality: Name
+    conductor: Name
+    dielectric: Name
+    tools: Annotated[dict[str, int], _given] = Field(default={})
+    meters: Annotated[Meters, _given] = Meters()
+    coupons: dict[str, dict[str, Any]]
 
 
 def blank(head: Mapping[str, str], coupons: Sequence[Coupon], expected: Mapping[str, Sequence[float]]) -> str:
@@ -96,43 +96,40 @@ def blank(head: Mapping[str, str], coupons: Sequence[Coupon], expected: Mapping[
         "# Numbers are in the unit at the end of a key, or have a unit of their own, as in 1.2 kohm.",
         "# plate.svg shows each coupon, its strips, films and pads by number, and where terminals are to be made.",
         *(f"{key}: {value}" for key, value in head.items()),
-        "meters:  # standard deviations of one reading",
-        "  resistance_percent: 1", "  capacitance_percent: 1", "  force_percent: 1",
-        "  calipers_mm: 0.01", "  compression_mm: 0.002  # after the compliance of the stand is subtracted",
+        "meters:  # standard deviations of one reading; of a compression, after the stand's compliance is subtracted",
+        *(f"  {key}: {value:g}" for key, value in Meters().model_dump().items()),
         "coupons:",
-    ]  # fmt: skip
+    ]
     for coupon in coupons:
-        lines.append(f"  {coupon.name}:")
-        lines += [f"    {s.key}: ~  # calipers, mean of three; drawn {s.drawn:g}" for s in coupon.sizes if s.measured]
-        for reading, value in zip(coupon.readings, expected[coupon.name], strict=True):
-            if reading.kind == "stiffness":
-                lines.append(f"    {reading.key}_load_n: {reading.load_n:g}  # change it to the load that was used")
-                lines.append(
-                    f"    {reading.key}_mm: ~  # {reading.how}, under this load; expected about "
-                    f"{_about(reading.load_n / value * 1e3)}"
-                )
-            else:
-                scale = 1e12 if reading.kind == "capacitance" else 1.0
-                lines.append(f"    {reading.key}: ~  # {reading.how}; expected about {_about(value * scale)}")
-    lines.append(f"  {LINES}:")
-    several = [(k, f"{k} line{'s' * (k > 1)}") for k in range(1, WALLS + 1)]
-    lines += [f"    wall_{k}_mm: ~  # calipers, wall of {words}; 0 if it is not there" for k, words in several]
-    for axis, way in (("x", "from left to right"), ("y", "from front to back")):
-        lines.append(f"    vernier_{axis}: ~  # number of the pair of lines that meet, -5 to 5 {way}; 0 is the middle")
-    films = range(1, FILMS + 1)
-    lines += [
-        f"    film_{k}_short: ~  # {k} layer{'s' * (k > 1)}: true or false; ohmmeter from strip to pad, below 1 Mohm"
-        for k in films
-    ]
-    lines += [
-        f"    comb_{k}_short: ~  # true or false: between the tracks {words} apart" for k, words in several[:COMBS]
-    ]
+        lines += [f"  {coupon.name}:", *(f"    {field}" for field in _fields(coupon, expected[coupon.name]).values())]
+    lines += [f"  {LINES}:", *(f"    {key}: ~  # {about}" for key, about in _line_fields().items())]
     return "\n".join(lines) + "\n"
 
 
-def _about(value: float) -> str:
-    """Two digits, as people write them."""
-    return f"{float(f'{value:.2g}'):.12g}"
+def _fields(coupon: Coupon, expected: Sequence[float]) -> dict[str, str]:
+    """Fields of a coupon by their keys: sizes, and readings beside what is expected of them."""
+    fields = {s.key: f"~  # calipers, mean of three; drawn {s.drawn:g}" for s in coupon.sizes if s.measured}
+    for reading, value in zip(coupon.readings, expected, strict=True):
+        about = f"~  # {reading.how}"
+        if reading.kind == "stiffness":
+            fields[f"{reading.key}_load_n"] = f"{reading.load_n:g}  # change it to the load that was used"
+            about, value = f"{about}, under this load", reading.load_n / value / M_PER_MM
+        fields[reading.field] = f"{about}; expected about {float(f'{value / reading.unit:.2g}'):.12g}"
+    return {key: f"{key}: {words}" for key, words in fields.items()}
+
+
+def _line_fields() -> dict[str, str]:
+    """Fields of the piece for lines and shorts, and what each is."""
+    several = [(k, f"{k} line{'s' * (k > 1)}") for k in range(1, WALLS + 1)]
+    fields = {f"wall_{k}_mm": f"calipers, wall of {words}; 0 if it is not there" for k, words in several}
+    for axis, way in (("x", "from left to right"), ("y", "from front to back")):
+        fields[f"vernier_{axis}"] = f"number of the pair of lines that meet, -5 to 5 {way}; 0 is the middle"
+    for k in range(1, FILMS + 1):
+        about = f"{k} layer{'s' * (k > 1)}: true or false; ohmmeter from strip to pad, below 1 Mohm"
+        fields[f"film_{k}_short"] = about
+    return fields | {
+        f"comb_{k}_short": f"true or false: between the tracks {words} apart" for k, words in several[:COMBS]
+    }
 
 
 def read(path: Path) -> Form:
@@ -144,28 +141,8 @@ def read(path: Path) -> Form:
         Not readable, a key is missing or unknown, or a number makes no sense; the message names the key.
     """
     data = yamlfile.read(path)
-    try:
-        if strange := [key for key in data if key not in _HEAD]:
-            raise UnknownName("key", strange[0], _HEAD)
-        names = [data.get(key) for key in _HEAD[:5]]
-        for key, value in zip(_HEAD, names, strict=False):
-            if not isinstance(value, str) or not value:
-                raise BadInput(f"{key} is {shown(value)}; expected its name, as the plate's form has it")
-        coupons: Any = data.get("coupons")
-        tools = data.get("tools") or {}
-        if not _maps_to(coupons, Mapping):
-            raise BadInput("coupons: expected each coupon's name with its readings, as the plate's form has them")
-        if not _maps_to(tools, int) or bool in map(type, tools.values()):
-            raise BadInput(f"tools is {shown(tools)}; expected each material's tool, as the plate's form has them")
-        plate, printer, quality, conductor, dielectric = map(str, names)
-        meters = _meters(data.get("meters") or {})
-        return Form(plate, printer, quality, conductor, dielectric, tools, meters, coupons)
-    except SensorgenError as error:
-        raise error.within(str(path)) from None
-
-
-def _maps_to(data: Any, kind: type) -> bool:
-    return isinstance(data, Mapping) and all(isinstance(value, kind) for value in data.values())
+    with within(str(path)):
+        return checked(Form, data)
 
 
 def refuse_filled(path: Path) -> None:
@@ -184,20 +161,6 @@ def refuse_filled(path: Path) -> None:
         full = True
     if full:
         raise BadInput(f"{str(path)!r} has readings, or is damaged: move it away, or choose another plate's --name")
-
-
-def _meters(given: object) -> Meters:
-    if not isinstance(given, Mapping):
-        raise BadInput(f"meters is {shown(given)}; expected a mapping of names to numbers")
-    own: dict[str, float] = {}
-    for key, value in given.items():
-        if key not in (*_PERCENT, "calipers_mm", "compression_mm"):
-            raise UnknownName("key of meters", key, (*_PERCENT, "calipers_mm", "compression_mm"))
-        number = _number(f"meters.{key}", value)
-        if number is None or not 1e-6 <= number <= 50:
-            raise OutOfRange(f"meters.{key} is {shown(value)}; expected 1e-6 to 50")
-        own[_PERCENT.get(str(key), str(key))] = number / 100 if key in _PERCENT else number
-    return Meters(**own)
 
 
 def _number(key: str, value: object) -> float | None:
@@ -253,20 +216,16 @@ def observations(form: Form, known: Sequence[Coupon], expected: Mapping[str, Seq
 def _observation(
     name: str, coupon: Coupon, fields: Mapping[str, Any], meters: Meters, expected: Sequence[float]
 ) -> Observation:
-    keys = [size.key for size in coupon.sizes if size.measured]
-    for reading in coupon.readings:
-        keys += [f"{reading.key}_load_n", f"{reading.key}_mm"] if reading.kind == "stiffness" else [reading.key]
-    for key in fields:
-        if key not in keys:
-            raise UnknownName(f"reading of {name}", key, keys)
+    keys = _fields(coupon, expected)
+    _refuse_unknown(name, fields, keys)
     values = {key: _number(f"{name}.{key}", fields.get(key)) for key in keys}
     sizes = [_size(name, size, values, meters) if size.measured else size for size in coupon.sizes]
     logs, noise = [], []
     for reading, usual in zip(coupon.readings, expected, strict=True):
-        value = _si(name, reading.key, reading.kind, values, sizes)
+        value = _si(name, reading, values, sizes)
         if value is not None and not usual / _DEFECT <= value <= usual * _DEFECT:
             raise OutOfRange(
-                f"{name}.{reading.key} is {fields.get(reading.key, fields.get(f'{reading.key}_mm'))}, more than "
+                f"{name}.{reading.key} is {fields[reading.field]}, more than "
                 f"{_DEFECT:g} times off what the sources let expect: check its unit, or leave ~"
             )
         logs.append(math.log(value) if value else math.nan)
@@ -286,33 +245,27 @@ def _size(name: str, size: CouponSize, values: Mapping[str, float | None], meter
 
 
 def _si(
-    name: str, key: str, kind: str, values: Mapping[str, float | None], sizes: Sequence[CouponSize]
+    name: str, reading: CouponReading, values: Mapping[str, float | None], sizes: Sequence[CouponSize]
 ) -> float | None:  # fmt: skip
     """A reading in SI units: ohm, F, or the small-strain stiffness [N/m]; None for a gap."""
-    value = values[f"{key}_mm"] if kind == "stiffness" else values[key]
+    value = values[reading.field]
     if value is None:
         return None
     if value == 0:
-        raise OutOfRange(f"{name}.{key} is 0; expected a number above 0, or ~ where nothing was measured")
-    if kind != "stiffness":
-        return value * (1e-12 if kind == "capacitance" else 1.0)
-    load, height = values[f"{key}_load_n"], next(size.drawn for size in sizes if size.key == "height_mm")
+        raise OutOfRange(f"{name}.{reading.key} is 0; expected a number above 0, or ~ where nothing was measured")
+    if reading.kind != "stiffness":
+        return value * reading.unit
+    load, height = values[f"{reading.key}_load_n"], next(size.drawn for size in sizes if size.key == "height_mm")
     if not load:
-        raise BadInput(f"{name}.{key}_load_n is missing; expected the load under which {key}_mm was read [N]")
+        raise BadInput(f"{name}.{reading.key}_load_n is missing; expected the load of {reading.field} [N]")
     if value >= 0.5 * height:
-        raise OutOfRange(f"{name}.{key}_mm is {value:g} of {height:g} mm; expected a compression below half the height")
+        raise OutOfRange(f"{name}.{reading.field} is {value:g} of {height:g} mm; expected less than half the height")
     return load / (value * M_PER_MM) / float(secant_stiffening(value / height))
 
 
-def _check_lines(fields: Mapping[str, Any], shorts: Sequence[str], verniers: Sequence[str]) -> None:
-    """Refuse shorts that are neither true nor false, and numbers of lines that verniers do not have."""
-    for key in shorts:
-        if fields.get(key) not in (None, True, False):
-            raise BadInput(f"{LINES}.{key} is {shown(fields[key])}; expected true, false or ~")
-    for key in verniers:
-        value = fields.get(key)
-        if value is not None and (isinstance(value, bool) or value not in range(-5, 6)):
-            raise OutOfRange(f"{LINES}.{key} is {shown(value)}; expected a whole number from -5 to 5, or ~")
+def _refuse_unknown(name: str, fields: Mapping[str, Any], known: Mapping[str, str]) -> None:
+    if strange := [key for key in fields if key not in known]:
+        raise UnknownName(f"reading of {name}", strange[0], known)
 
 
 def lines_of(form: Form) -> LineReadings:
@@ -323,15 +276,20 @@ def lines_of(form: Form) -> LineReadings:
     UnknownName, BadInput, OutOfRange
         As :func:`observations`.
     """
-    fields = form.coupons.get(LINES, {})
-    walls, films, combs = ([f"{kind}_{k}_{end}" for k in range(1, count + 1)] for kind, end, count in
-                           (("wall", "mm", WALLS), ("film", "short", FILMS), ("comb", "short", COMBS)))  # fmt: skip
-    verniers = ["vernier_x", "vernier_y"]
-    if strange := [key for key in fields if key not in (*walls, *films, *combs, *verniers)]:
-        raise UnknownName(f"reading of {LINES}", strange[0], (*walls, *verniers, *films, *combs))
-    _check_lines(fields, (*films, *combs), verniers)
+    given = form.coupons.get(LINES, {})
+    _refuse_unknown(LINES, given, _line_fields())
+    fields = {key: given.get(key) for key in _line_fields()}
+    for key, value in fields.items():
+        if key.endswith("short") and value not in (None, True, False):
+            raise BadInput(f"{LINES}.{key} is {shown(value)}; expected true, false or ~")
+        if key.startswith("vernier") and (isinstance(value, bool) or value not in (None, *range(-5, 6))):
+            raise OutOfRange(f"{LINES}.{key} is {shown(value)}; expected a whole number from -5 to 5, or ~")
+    walls, offsets, films, combs = (
+        [(key, value) for key, value in fields.items() if key.startswith(kind)]
+        for kind in ("wall", "vernier", "film", "comb")
+    )
     return LineReadings(
-        tuple(_number(f"{LINES}.{key}", fields.get(key)) for key in walls),
-        tuple(None if fields.get(key) is None else STEP_MM * fields[key] for key in verniers),
-        tuple(fields.get(key) for key in films), tuple(fields.get(key) for key in combs),
+        tuple(_number(f"{LINES}.{key}", value) for key, value in walls),
+        tuple(None if value is None else STEP_MM * value for _, value in offsets),
+        tuple(value for _, value in films), tuple(value for _, value in combs),
     )  # fmt: skip

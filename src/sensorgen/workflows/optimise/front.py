@@ -7,9 +7,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import inf, log
-from typing import Any
+from typing import Annotated, Any
 
 from sensorgen.core.bounds import Bounds, Interval
+from sensorgen.core.document import Column
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.parallel import Lane, open_lanes, remembered, said
 from sensorgen.workflows.optimise import ladder
@@ -22,6 +23,7 @@ MARGIN = 1.5  # between a number on the coarse mesh and its best value; widened 
 _SURE, _POWER, _WIDER = 3, 5, 1.1  # evaluated designs from which on it is a power of the largest seen, or wider by 1.1
 FEW = 8  # designs that are evaluated without a coarse mesh [-]
 _CHECKS, _BOUNDS, _EVALUATION = range(3)
+RULE = "fewest warnings, then most layers between the electrodes, then best value"
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 
 Progress = Callable[[str, int, int], None]  # step, how many are done, how many there are
@@ -55,6 +57,24 @@ class Workers:
 
 
 HERE = Workers()
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why designs are out: whether that is proven, and how many."""
+
+    why: str
+    certified: bool
+    count: int
+
+
+@dataclass(frozen=True)
+class Binding:
+    """A constraint: how many designs violate it, and how many violate nothing else."""
+
+    constraint: Annotated[str, Column("constraint")]
+    violated: Annotated[int, Column("violated by")]
+    alone: Annotated[int, Column("by it alone")]
 
 
 class Front(Search):
@@ -225,8 +245,8 @@ class Front(Search):
         """Designs that were evaluated."""
         return tuple(row for row in self.rows if row.trial)
 
-    def reasons(self) -> list[tuple[str, bool, int]]:
-        """Why designs are out, whether that is proven, and how many; of reasons that differ in numbers the first."""
+    def reasons(self) -> list[Reason]:
+        """Most frequent first; of reasons that differ in numbers alone the first."""
         found: Counter[tuple[str, bool]] = Counter()
         words: dict[str, str] = {}
         front = {row.number for row in self.front}
@@ -238,7 +258,7 @@ class Front(Search):
                 alike = _NUMBER.sub("#", why)
                 words.setdefault(alike, why)
                 found[alike, row.certified and bool(row.discarded)] += 1
-        return [(words[alike], certified, count) for (alike, certified), count in found.most_common()]
+        return [Reason(words[alike], certified, count) for (alike, certified), count in found.most_common()]
 
     def nearest(self) -> Candidate | None:
         """Where nothing meets the target: the design that violates the fewest constraints, and these the least."""
@@ -247,15 +267,14 @@ class Front(Search):
             tried, key=lambda row: (row.trial is None, len(row.violated), sum(row.violated.values())), default=None
         )
 
-    def binding(self) -> list[tuple[str, int, int]]:
-        """Constraints, how many designs violate each, and how many violate nothing else."""
+    def binding(self) -> list[Binding]:
+        """Those first that most designs violate alone."""
         every, alone = Counter[str](), Counter[str]()
         for row in self.rows:
             every.update(list(row.violated))
             alone.update(list(row.violated) if len(row.violated) == 1 else ())
-        return [
-            (name, count, alone[name]) for name, count in sorted(every.items(), key=lambda i: (-alone[i[0]], -i[1]))
-        ]
+        rows = (Binding(name, count, alone[name]) for name, count in every.items())
+        return sorted(rows, key=lambda row: (-row.alone, -row.violated))
 
 
 def search(
@@ -306,3 +325,55 @@ def _compromise(target: Target, front: Sequence[Candidate]) -> Callable[[Candida
         return max((worth[row.number][key].lower - low) / span for key, (low, span) in spans.items())
 
     return distance
+
+
+def tied(one: Candidate, other: Candidate, keys: Sequence[str]) -> bool:
+    """Test whether the best value of each lies within what the models leave open of the other, in every objective."""
+    for key in keys:
+        first, second = value_of(key, one), value_of(key, other)
+        if first is None or second is None:
+            return False
+        alike = first.model.lower <= second.value <= first.model.upper
+        if not (alike and second.model.lower <= first.value <= second.model.upper):
+            return False
+    return True
+
+
+def settled(found: Front, best: Candidate, key: str = "") -> tuple[Candidate, tuple[Candidate, ...]]:
+    """The design to print among those of the front that equal the best within what the models leave open.
+
+    Parameters
+    ----------
+    found : Front
+        The search.
+    best : Candidate
+        With the best value of an objective, or the best compromise.
+    key : str
+        The objective: of designs that are equal in it those count that are best in the other objectives, one by one;
+        "" for the compromise, from which the others must not differ in any objective.
+
+    Returns
+    -------
+    tuple
+        The design that :data:`RULE` chooses, and the others.
+    """
+    target = found.target
+    keys = [key, *(k for k in target.objectives if k != key)] if key else list(target.objectives)
+    group = [row for row in found.front if row is best or tied(best, row, keys[:1] if key else keys)]
+    for each in keys[1:] if key else ():
+        ahead = min(group, key=partial(worth, target, each))
+        group = [row for row in group if row is ahead or tied(ahead, row, [each])]
+    chosen = min(group, key=lambda row: (*_rule(row), worth(target, keys[0], row), row.number))
+    return chosen, tuple(row for row in group if row is not chosen)
+
+
+def worth(target: Target, key: str, row: Candidate) -> float:
+    """An objective's best value of an evaluated design, the lower the better."""
+    value = value_of(key, row)
+    return target.worth(key, value.value) if value else float("inf")
+
+
+def _rule(row: Candidate) -> tuple[int, int]:
+    """Warnings, and layers between the electrodes as printed, negative [-]."""
+    gap = value_of("gap_mm", row)
+    return row.counts()[1], -round(gap.value / row.design.layers.layer_mm) if gap else 0

@@ -18,11 +18,10 @@ from sensorgen.design.walls import rules
 from sensorgen.prediction.mesh_ladder import ROUGH
 from sensorgen.workflows.build import build
 from sensorgen.workflows.optimise import ladder
-from sensorgen.workflows.optimise.front import HERE, Front, Workers, value_of
+from sensorgen.workflows.optimise.front import HERE, Front, Workers, settled, value_of, worth
 from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended, chosen, leads
 from sensorgen.workflows.optimise.space import grid_mm
 from sensorgen.workflows.optimise.target import NUMBERS, Target
-from sensorgen.workflows.optimise.ties import settled, worth
 from sensorgen.workflows.search import Candidate, EarlyNumber
 from sensorgen.workflows.slice import slice_design
 from sensorgen.workflows.trial import trial

@@ -10,32 +10,13 @@ from sensorgen.core.display import Displayed
 from sensorgen.core.document import Cell, Column, Part, Table, comma_separated, shown
 from sensorgen.core.findings import Verdict
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
-from sensorgen.workflows.optimise.front import Front, value_of
+from sensorgen.workflows.optimise.front import RULE, Binding, Front, Reason, tied, value_of
+from sensorgen.workflows.optimise.front import worth as worth_of
 from sensorgen.workflows.optimise.target import NUMBERS, OURS, Target
-from sensorgen.workflows.optimise.ties import RULE, tied
-from sensorgen.workflows.optimise.ties import worth as worth_of
 from sensorgen.workflows.search import Candidate
 
 _LISTED = 8  # designs, of those that are tied
 _SAME = 1e-9  # relative difference of numbers that are equal but for rounding
-
-
-@dataclass(frozen=True)
-class Reason:
-    """Why designs are out: whether that is proven, and how many."""
-
-    why: str
-    certified: bool
-    count: int
-
-
-@dataclass(frozen=True)
-class Binding:
-    """A constraint: how many designs violate it, and how many violate nothing else."""
-
-    constraint: str
-    violated: int
-    alone: int
 
 
 @dataclass(frozen=True)
@@ -259,10 +240,7 @@ class Optimised(Displayed):
             has = f" ({numbers})" if numbers else ""
             yield f"nearest: {values}; violates {', '.join(self.nearest.violated)}{has}"
         if self.binding:
-            yield Table(
-                "binding", "", (Column("constraint"), Column("violated by"), Column("by it alone")),
-                tuple((b.constraint, b.violated, b.alone) for b in self.binding),
-            )  # fmt: skip
+            yield Table.of("binding", "", self.binding)
 
     def csv(self) -> Iterator[str]:
         """Every design with its numbers, or why it has none."""
@@ -341,9 +319,9 @@ def result(name: str, found: Front, recommended: tuple[Recommended, ...] = ()) -
     return Optimised(
         name, len(found.rows), len(found.evaluated),
         {k: goal if isinstance(goal, str) else f"near {goal.near:g}" for k, goal in found.target.objectives.items()},
-        tuple(Reason(*reason) for reason in found.reasons()), tuple(designs[row.number - 1] for row in found.front),
+        tuple(found.reasons()), tuple(designs[row.number - 1] for row in found.front),
         designs, found.margin, found.largest or None, recommended, designs[nearest.number - 1] if nearest else None,
-        () if front else tuple(Binding(*each) for each in found.binding()), tuple(_remarks(found)),
+        () if front else tuple(found.binding()), tuple(_remarks(found)),
         found.whole,
     )  # fmt: skip
 

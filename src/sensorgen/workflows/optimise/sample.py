@@ -4,10 +4,9 @@ import importlib.util
 from collections.abc import Sequence
 
 from sensorgen.core.errors import NotInstalled
-from sensorgen.workflows.optimise.front import HERE, Front, Progress, Workers
+from sensorgen.workflows.optimise.front import HERE, Front, Progress, Workers, worth
 from sensorgen.workflows.optimise.space import Space
 from sensorgen.workflows.optimise.target import Target
-from sensorgen.workflows.optimise.ties import worth
 from sensorgen.workflows.search import Candidate
 
 POPULATION = 24  # designs of a generation

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
-from sensorgen.verification.thesis.verdicts import ItemPart
+from sensorgen.verification.thesis.verdicts import ItemPart, Parts
 
 LENGTH_M, WIDTH_M, HEIGHT_M, FILM_M = 0.1, 0.01, 3e-4, 6e-4  # Table 3.1
 EPS_R = 4.68
@@ -48,10 +48,11 @@ def unpressed_ohm(rho_ohm_m: float = RHO_OHM_M, frequency_hz: ArrayLike = FREQUE
     return np.asarray(np.sqrt(2) * rho_ohm_m * (1 + e) / (AREA_M2 * np.sqrt(gamma) * (-1 + e)))
 
 
-def both_parts(name: str, unit: str, ours: ArrayLike, printed: ArrayLike) -> list[ItemPart]:
+def both_parts(name: str, unit: str, ours: ArrayLike, printed: ArrayLike) -> Parts:
     """Both parts by themselves: of an impedance, the real one is small and all that tells a position."""
     parts = (("Re", np.real), ("Im", np.imag))
-    return [ItemPart(f"{which} {name}", unit, part(ours), part(printed)) for which, part in parts]
+    for which, part in parts:
+        yield ItemPart(f"{which} {name}", unit, part(ours), part(printed))
 
 
 class Smooth:

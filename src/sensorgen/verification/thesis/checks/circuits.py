@@ -10,7 +10,7 @@ from sensorgen.models import columns, fem2d, line
 from sensorgen.verification.thesis.checks._columns import EPS_R, FILM_MM, PERMITTIVITY, Layer, piles, piles_f
 from sensorgen.verification.thesis.checks._field import INPUT_V, LENGTH_M, OMEGA, RHO_OHM_M, TRACKS
 from sensorgen.verification.thesis.items import table
-from sensorgen.verification.thesis.verdicts import ItemPart
+from sensorgen.verification.thesis.verdicts import ItemPart, Parts
 
 _PLATE_M, _PLATE_M2 = 0.6e-3, 1e-3  # Table 3.1
 _PLATE = designs.make({"shape": "reference"})
@@ -26,41 +26,41 @@ _RUNGS: dict[int, tuple[tuple[Layer, ...], float]] = {
 }
 
 
-def plate(eps_r: float = EPS_R) -> list[ItemPart]:
+def plate(eps_r: float = EPS_R) -> Parts:
     """2.5, 2.7, B.9: the plate of Table 3.1, of any dielectric, by columns."""
     ours = columns.capacitance(_PLATE.in_use, {"x60": eps_r, "air": 1.0})
-    return [ItemPart("C", "F", (ours.lower + ours.upper) / 2, EPS0_F_PER_M * eps_r * _PLATE_M2 / _PLATE_M)]
+    yield ItemPart("C", "F", (ours.lower + ours.upper) / 2, EPS0_F_PER_M * eps_r * _PLATE_M2 / _PLATE_M)
 
 
-def earlier() -> list[ItemPart]:
+def earlier() -> Parts:
     """Chapter 1: the plate of Table C.1 at rest."""
     given = table("C.1")
     length, width = given["size_mm"]
     over = length * width / given["plate_mm"] * M_PER_MM
-    return [ItemPart("C at rest", "F", EPS0_F_PER_M * given["x60"]["relative_permittivity"] * over)]
+    yield ItemPart("C at rest", "F", EPS0_F_PER_M * given["x60"]["relative_permittivity"] * over)
 
 
-def solved_plate() -> list[ItemPart]:
+def solved_plate() -> Parts:
     """4.1: the same by its field."""
     bounds = fem2d.capacitance(_PLATE.in_use, PERMITTIVITY)
-    return [ItemPart("C", "F", bounds.upper, EPS0_F_PER_M * EPS_R * _PLATE_M2 / _PLATE_M)]
+    yield ItemPart("C", "F", bounds.upper, EPS0_F_PER_M * EPS_R * _PLATE_M2 / _PLATE_M)
 
 
-def slice_of_plate() -> list[ItemPart]:
+def slice_of_plate() -> Parts:
     """B.10: what a plate of a length gains by a slice."""
     long, short = (piles_f([(length, [("x60", 0.6)])], 10.0) for length in (100.0, 99.0))
-    return [ItemPart("C of 1 mm", "F", long - short, EPS0_F_PER_M * EPS_R * 1e-2 * 1e-3 / _PLATE_M)]
+    yield ItemPart("C of 1 mm", "F", long - short, EPS0_F_PER_M * EPS_R * 1e-2 * 1e-3 / _PLATE_M)
 
 
-def charge_of_plate() -> list[ItemPart]:
+def charge_of_plate() -> Parts:
     """6.1: charge that the line's current brings in a period, at a tone where its tracks do not count."""
     omega = 2 * np.pi * _SLOW_HZ
     z = line.impedance(line.PressedLine(**TRACKS | {"length_m": LENGTH_M, "frequency_hz": _SLOW_HZ}))
     printed = EPS0_F_PER_M * EPS_R * _PLATE_M2 / _PLATE_M * INPUT_V
-    return [ItemPart("q at 1 V", "C", float(abs(INPUT_V / z) / omega), printed)]
+    yield ItemPart("q at 1 V", "C", float(abs(INPUT_V / z) / omega), printed)
 
 
-def air_gaps() -> list[ItemPart]:
+def air_gaps() -> Parts:
     """2.8 to 2.11: strips of dielectric and of air side by side between plates, by their field."""
     beside = [(_STRIP_MM, [("x60", _HIGH_MM)]), (_GAP_MM, [("air", _HIGH_MM)])]
     depth_mm = 1.0
@@ -68,21 +68,18 @@ def air_gaps() -> list[ItemPart]:
     c_de, c_air = (
         EPS0_F_PER_M * PERMITTIVITY[layers[0][0]] * width * depth_mm / _HIGH_MM * M_PER_MM for width, layers in beside
     )
-    return [ItemPart("C of both", "F", (bounds.lower + bounds.upper) / 2, c_de + c_air)]
+    yield ItemPart("C of both", "F", (bounds.lower + bounds.upper) / 2, c_de + c_air)
 
 
-def cogs() -> list[ItemPart]:
+def cogs() -> Parts:
     """2.5, 2.6: a conductor's teeth in the dielectric, of the rectangular design's sizes; no sizes are printed."""
     flat, teeth = _STRIP_MM + _GAP_MM, [(_STRIP_MM, [("x60", FILM_MM)]), (_GAP_MM, [("x60", FILM_MM + _HIGH_MM)])]
     plain = piles_f([(flat, [("x60", FILM_MM + _HIGH_MM)])])
     field = fem2d.capacitance(piles(teeth, 1.0), PERMITTIVITY).upper
     cog_ohm = RHO_OHM_M * _HIGH_MM / (_STRIP_MM * 1.0 * M_PER_MM)
-    return [
-        ItemPart(
-            "C with cogs over C without, by columns and by the field", "", [piles_f(teeth) / plain, field / plain]
-        ),
-        ItemPart("a cog's resistance over the reactance below it, at 99.7 kHz", "", cog_ohm * OMEGA * field, shown=2),
-    ]
+    both = [piles_f(teeth) / plain, field / plain]
+    yield ItemPart("C with cogs over C without, by columns and by the field", "", both)
+    yield ItemPart("a cog's resistance over the reactance below it, at 99.7 kHz", "", cog_ohm * OMEGA * field, shown=2)
 
 
 def _reactance(layers: Sequence[Layer]) -> float:
@@ -91,20 +88,21 @@ def _reactance(layers: Sequence[Layer]) -> float:
     return sum(t * M_PER_MM / (OMEGA * EPS0_F_PER_M * PERMITTIVITY[name] * area) for name, t in layers)
 
 
-def rung(number: int) -> list[ItemPart]:
+def rung(number: int) -> Parts:
     """2.19, 2.21: magnitudes of reactances; 2.20, 2.22: added to a cog's resistance, as though they were real."""
     layers, cog_mm = _RUNGS[number]
     if not cog_mm:
         size = abs(1 / (1j * OMEGA * piles_f([(_WIDTH_MM, layers)], _DEPTH_MM)))
-        return [ItemPart(f"size of Z_{number}", "ohm", size, _reactance(layers))]
+        yield ItemPart(f"size of Z_{number}", "ohm", size, _reactance(layers))
+        return
     cog = RHO_OHM_M * cog_mm / (_WIDTH_MM * _DEPTH_MM * M_PER_MM)
     ours = cog + 1 / (1j * OMEGA * piles_f([(_WIDTH_MM, layers)], _DEPTH_MM))
-    return [ItemPart(f"Z_{number}", "ohm", ours, complex(cog + _reactance(layers)), cog - 1j * _reactance(layers))]
+    yield ItemPart(f"Z_{number}", "ohm", ours, complex(cog + _reactance(layers)), cog - 1j * _reactance(layers))
 
 
-def rungs() -> list[ItemPart]:
+def rungs() -> Parts:
     """2.23: four impedances side by side, of cogs that do not resist."""
     z1, z2, z3, z4 = (-1j * _reactance(layers) for layers, _ in _RUNGS.values())
     ours = 1 / (1j * OMEGA * piles_f([(_WIDTH_MM, layers) for layers, _ in _RUNGS.values()], _DEPTH_MM))
     printed = z1 * z2 * z3 * z4 / (z1 * z2 * z3 + z2 * z3 * z4 + z1 * z2 * z4 + z1 * z3 * z4)
-    return [ItemPart("Z_r", "ohm", ours, printed)]
+    yield ItemPart("Z_r", "ohm", ours, printed)

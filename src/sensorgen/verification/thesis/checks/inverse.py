@@ -9,7 +9,7 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.verification.thesis.items import table
-from sensorgen.verification.thesis.verdicts import ItemPart
+from sensorgen.verification.thesis.verdicts import ItemPart, Parts
 
 _LOW_HZ, _TONE_HZ = 1.1e3, 99.7e3
 _MISSED_OHM = 2.0
@@ -56,32 +56,31 @@ def _straight(tone_hz: float) -> tuple[Real, Real, float]:
     return c - rest, straight - rest, float(np.ptp(straight) / np.ptp(force))
 
 
-def capacitance() -> list[ItemPart]:
+def capacitance() -> Parts:
     """C.1: one straight line for all positions; by what a press changes, at the lowest and the highest tone."""
-    return [ItemPart(f"C - C(0) at {tone / 1e3:g} kHz", "F", *_straight(tone)[:2]) for tone in (_LOW_HZ, _TONE_HZ)]
+    for tone in (_LOW_HZ, _TONE_HZ):
+        yield ItemPart(f"C - C(0) at {tone / 1e3:g} kHz", "F", *_straight(tone)[:2])
 
 
-def force() -> list[ItemPart]:
+def force() -> Parts:
     """C.4: the force that C.1 reads from these capacitances."""
     pressed, _, _, _ = _readings()
-    coefficients = []
     for tone in (_LOW_HZ, _TONE_HZ):
         rise, straight, slope = _straight(tone)
-        coefficients.append(ItemPart(f"F at {tone / 1e3:g} kHz", "N", pressed, pressed + (rise - straight) / slope))
-    return coefficients
+        yield ItemPart(f"F at {tone / 1e3:g} kHz", "N", pressed, pressed + (rise - straight) / slope)
 
 
-def resistance() -> list[ItemPart]:
+def resistance() -> Parts:
     """C.2: what force and position change of R, by both sets of powers."""
     force, x, _, r = _readings()
     rest = float(np.real(_SENSOR.impedance(_TONE_HZ, 0.0, _LENGTH_M / 2)))
     one = np.ones_like(force)
     printed = _least_squares([one, force, x * x, x, force * x], r - rest)
     corrected = _least_squares([one, force, force * x, force * x * x], r - rest)
-    return [ItemPart("R - R0", "ohm", r - rest, printed, corrected)]
+    yield ItemPart("R - R0", "ohm", r - rest, printed, corrected)
 
 
-def cost() -> list[ItemPart]:
+def cost() -> Parts:
     """C.3: readings that miss C.2 by a known amount, which bends with the force and so no fit can follow."""
     force, x, _, r = _polynomial()
     bent = 3 * (force - force.mean()) ** 2
@@ -90,7 +89,7 @@ def cost() -> list[ItemPart]:
     fitted = _least_squares([np.ones_like(force), force, x * x, x, force * x], r + missed)
     left = np.sqrt(np.mean((fitted - r - missed) ** 2))
     outside = np.sqrt(np.sum(missed) ** 2 / len(missed))
-    return [ItemPart("what is left of R", "ohm", float(left), float(outside), _MISSED_OHM)]
+    yield ItemPart("what is left of R", "ohm", float(left), float(outside), _MISSED_OHM)
 
 
 def _polynomial() -> tuple[Real, Real, Real, Real]:
@@ -99,7 +98,7 @@ def _polynomial() -> tuple[Real, Real, Real, Real]:
     return force, x, _C0_F + force * _CF_F_PER_N, _R0 + _A * force + _B * x * x + _D * x + _E * force * x
 
 
-def position() -> list[ItemPart]:
+def position() -> Parts:
     """C.5, on presses whose resistance is that polynomial; printed without the measured one, and with -(D + EF)^2."""
     _, x, c, r = _polynomial()
     f = (c - _C0_F) / _CF_F_PER_N
@@ -108,9 +107,9 @@ def position() -> list[ItemPart]:
     under = linear**2 - 4 * _B * (_R0 + _A * f - r)
     both = np.stack([(-linear + sign * np.sqrt(under)) / (2 * _B) for sign in (1, -1)], -1)
     corrected = np.take_along_axis(both, abs(both - x[:, None]).argmin(1)[:, None], 1)[:, 0]
-    return [ItemPart("x", "m", x, printed, corrected)]
+    yield ItemPart("x", "m", x, printed, corrected)
 
 
-def weights(w_fit: list[float]) -> list[ItemPart]:
+def weights(w_fit: list[float]) -> Parts:
     """C.1.1: weights of R0, C0, C_F, A, B, D, E, in the order of its list: B has none, and C.5 divides by it."""
-    return [ItemPart("B of C.5 over its first estimate", "", w_fit[4])]
+    yield ItemPart("B of C.5 over its first estimate", "", w_fit[4])

@@ -13,7 +13,7 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
 from sensorgen.verification.thesis.checks import _field
 from sensorgen.verification.thesis.checks._field import EPS_R, FILM_M, GAMMA, INPUT_V, LENGTH_M, LINE, OMEGA, TRACKS
-from sensorgen.verification.thesis.verdicts import ItemPart
+from sensorgen.verification.thesis.verdicts import ItemPart, Parts
 
 _X = _field.PLACES_M
 _DX = _field.STEP_M
@@ -50,87 +50,118 @@ def _gamma() -> complex:
     return complex(np.mean(_u(order=2) / LINE.difference_v.at(_X)))
 
 
-def _wrong_sign(name: str, unit: str, ours: NDArray[np.complex128], printed: NDArray[np.complex128]) -> list[ItemPart]:
-    return [ItemPart(name, unit, ours, printed, -printed)]
+def _wrong_sign(name: str, unit: str, ours: NDArray[np.complex128], printed: NDArray[np.complex128]) -> Parts:
+    yield ItemPart(name, unit, ours, printed, -printed)
 
 
-EQUATIONS: dict[str, Callable[[], list[ItemPart]]] = {
-    # 2.2, B.6: current from the slope of the potential, at one moment; 2.3, B.7: as phasors; 2.4, B.8: their slopes
-    "current_in_time": lambda: [
-        ItemPart("I1(x, t)", "A", _in_time(LINE.current_a.at(_X)), -_A_OVER_RHO * _in_time(_u(order=1)))
-    ],
-    "current": lambda: [ItemPart("I1(x)", "A", LINE.current_a.at(_X), -_A_OVER_RHO * _u(order=1))],
-    "slope_of_current": lambda: [ItemPart("dI1/dx", "A/m", LINE.current_a.at(_X, 1), -_A_OVER_RHO * _u(order=2))],
-    # 2.11, B.11: what a slice's capacitor takes is missing behind it; 2.12, B.12, B.14: the same from the potentials
-    "current_lost": lambda: [
-        ItemPart("I1(x + dx) - I1(x)", "A", _rise(LINE.current_a.at), -LINE.difference_v.at(_X) / _SLICE_OHM)
-    ],
-    "current_by_difference": lambda: _wrong_sign(
-        "I1(x + dx) - I1(x)", "A", _rise(LINE.current_a.at), _difference() / _SLICE_OHM
-    ),
-    "current_by_permittivity": lambda: _wrong_sign(
-        "I1(x + dx) - I1(x)", "A", _rise(LINE.current_a.at), _SLICE_S_PER_M * _DX * _difference()
-    ),
-    # B.15; 2.13: an impedance stands where an admittance per length belongs
-    "slope_by_permittivity": lambda: _wrong_sign(
-        "dI1/dx", "A/m", LINE.current_a.at(_X, 1), _SLICE_S_PER_M * _difference()
-    ),
-    "slope_by_impedance": lambda: [
-        ItemPart("dI1/dx", "A/m", LINE.current_a.at(_X, 1), 1j * _SLICE_OHM * _difference(),
-                 -_difference() / (_SLICE_OHM * _DX))
-    ],
-    # B.16, 2.14; 2.15, B.17: the conduction parameter
-    "bend_by_permittivity": lambda: _wrong_sign(
+def current_in_time() -> Parts:
+    """2.2, B.6: current from the slope of the potential, at one moment."""
+    yield ItemPart("I1(x, t)", "A", _in_time(LINE.current_a.at(_X)), -_A_OVER_RHO * _in_time(_u(order=1)))
+
+
+def current() -> Parts:
+    """2.3, B.7: the current from that slope, as phasors."""
+    yield ItemPart("I1(x)", "A", LINE.current_a.at(_X), -_A_OVER_RHO * _u(order=1))
+
+
+def slope_of_current() -> Parts:
+    """2.4, B.8: slopes of both."""
+    yield ItemPart("dI1/dx", "A/m", LINE.current_a.at(_X, 1), -_A_OVER_RHO * _u(order=2))
+
+
+def current_lost() -> Parts:
+    """2.11, B.11: current that a slice's capacitor takes is missing behind it."""
+    yield ItemPart("I1(x + dx) - I1(x)", "A", _rise(LINE.current_a.at), -LINE.difference_v.at(_X) / _SLICE_OHM)
+
+
+def current_by_difference() -> Parts:
+    """2.12, B.12: that current from the potentials."""
+    return _wrong_sign("I1(x + dx) - I1(x)", "A", _rise(LINE.current_a.at), _difference() / _SLICE_OHM)
+
+
+def current_by_permittivity() -> Parts:
+    """B.14: that current from the potentials, by permittivity."""
+    return _wrong_sign("I1(x + dx) - I1(x)", "A", _rise(LINE.current_a.at), _SLICE_S_PER_M * _DX * _difference())
+
+
+def slope_by_permittivity() -> Parts:
+    """B.15: slope of the current by permittivity."""
+    return _wrong_sign("dI1/dx", "A/m", LINE.current_a.at(_X, 1), _SLICE_S_PER_M * _difference())
+
+
+def slope_by_impedance() -> Parts:
+    """2.13: an impedance stands where an admittance per length belongs."""
+    yield ItemPart(
+        "dI1/dx", "A/m", LINE.current_a.at(_X, 1), 1j * _SLICE_OHM * _difference(), -_difference() / (_SLICE_OHM * _DX)
+    )
+
+
+def bend_by_permittivity() -> Parts:
+    """B.16: bend of the potential by permittivity."""
+    return _wrong_sign(
         "d2U1/dx2", "V/m2", _u(order=2), -_RHO_OVER_H * 1j * OMEGA * EPS0_F_PER_M * EPS_R / FILM_M * _difference()
-    ),
-    "bend_by_impedance": lambda: [
-        ItemPart("d2U1/dx2", "V/m2", _u(order=2), -1j * _RHO_OVER_H * _SLICE_OHM * _difference(),
-                 _GAMMA_BY_CELL * _difference())
-    ],
-    "conduction_by_impedance": lambda: [
-        ItemPart("Gamma", "1/m2", _gamma(), 1j * _RHO_OVER_H * _SLICE_OHM, _GAMMA_BY_CELL)
-    ],
-    "conduction": lambda: [ItemPart("Gamma", "1/m2", _gamma(), GAMMA)],
-    # 2.16, B.18; 2.17, B.19
-    "top_track": lambda: _wrong_sign("d2U1/dx2", "V/m2", _u(order=2), -GAMMA * _difference()),
-    "bottom_track": lambda: _wrong_sign("d2U2/dx2", "V/m2", LINE.bottom_v(_X, 2), GAMMA * _difference()),
-    # B.1, B.2: what is connected, and the current that goes in, by the slope of the potential
-    "contacts": lambda: [
-        ItemPart("U1(0)", "V", LINE.top_v(0.0), INPUT_V),
-        ItemPart("U2(0)", "V", LINE.bottom_v(0.0), 0.0, scale=INPUT_V),
-        ItemPart("I1(0)", "A", -_A_OVER_RHO * LINE.top_v(0.0, 1), LINE.input_a),
-    ],
-}  # fmt: skip
+    )
 
 
-def slice_current() -> list[ItemPart]:
+def bend_by_impedance() -> Parts:
+    """2.14: bend of the potential by impedance."""
+    yield ItemPart(
+        "d2U1/dx2", "V/m2", _u(order=2), -1j * _RHO_OVER_H * _SLICE_OHM * _difference(), _GAMMA_BY_CELL * _difference()
+    )
+
+
+def conduction_by_impedance() -> Parts:
+    """2.15: the conduction parameter by impedance."""
+    yield ItemPart("Gamma", "1/m2", _gamma(), 1j * _RHO_OVER_H * _SLICE_OHM, _GAMMA_BY_CELL)
+
+
+def conduction() -> Parts:
+    """B.17: the conduction parameter."""
+    yield ItemPart("Gamma", "1/m2", _gamma(), GAMMA)
+
+
+def top_track() -> Parts:
+    """2.16, B.18."""
+    return _wrong_sign("d2U1/dx2", "V/m2", _u(order=2), -GAMMA * _difference())
+
+
+def bottom_track() -> Parts:
+    """2.17, B.19."""
+    return _wrong_sign("d2U2/dx2", "V/m2", LINE.bottom_v(_X, 2), GAMMA * _difference())
+
+
+def contacts() -> Parts:
+    """B.1, B.2: potentials of the contacts, and the current that goes in, by the slope of the potential."""
+    yield ItemPart("U1(0)", "V", LINE.top_v(0.0), INPUT_V)
+    yield ItemPart("U2(0)", "V", LINE.bottom_v(0.0), 0.0, scale=INPUT_V)
+    yield ItemPart("I1(0)", "A", -_A_OVER_RHO * LINE.top_v(0.0, 1), LINE.input_a)
+
+
+def slice_current() -> Parts:
     """2.1, B.5: current through a slice from the potentials at its ends."""
     ours, rise = _in_time(LINE.current_a.at(_X)), _rise(LINE.top_v)
     first, second = _in_time(rise / (_DX / _A_OVER_RHO)), _in_time(-_A_OVER_RHO * rise / _DX)
-    return [
-        ItemPart("I1 by the first expression", "A", ours, first, -first),
-        ItemPart("I1 by the second expression", "A", ours, second),
-    ]
+    yield ItemPart("I1 by the first expression", "A", ours, first, -first)
+    yield ItemPart("I1 by the second expression", "A", ours, second)
 
 
-def slice_impedance() -> list[ItemPart]:
+def slice_impedance() -> Parts:
     """B.13: a slice whose tracks do not resist."""
     plain = TRACKS | {"top_resistivity_ohm_m": 0.0, "bottom_resistivity_ohm_m": 0.0}
     ours = line.impedance(line.PressedLine(length_m=_DX, **plain))
     by_permittivity = 1 / (_SLICE_S_PER_M * _DX)
-    return [ItemPart("by C", "ohm", ours, _SLICE_OHM), ItemPart("by permittivity", "ohm", ours, by_permittivity)]
+    yield ItemPart("by C", "ohm", ours, _SLICE_OHM)
+    yield ItemPart("by permittivity", "ohm", ours, by_permittivity)
 
 
-def far_end() -> list[ItemPart]:
+def far_end() -> Parts:
     """B.3: an open end, and one with so large a resistor that no current leaves; in both the potential ends flat."""
     shut = line.impedance(line.PressedLine(length_m=LENGTH_M, far_end=_NO_CURRENT_OHM, **TRACKS))
-    return [
-        ItemPart("Z", "ohm", LINE.impedance_ohm, shut),
-        ItemPart("dU1/dx at L", "V/m", LINE.top_v(LENGTH_M, 1), 0.0, scale=abs(LINE.input_a) / _A_OVER_RHO),
-    ]
+    yield ItemPart("Z", "ohm", LINE.impedance_ohm, shut)
+    yield ItemPart("dU1/dx at L", "V/m", LINE.top_v(LENGTH_M, 1), 0.0, scale=abs(LINE.input_a) / _A_OVER_RHO)
 
 
-def return_current() -> list[ItemPart]:
+def return_current() -> Parts:
     """B.4: as both tracks carry one current, only the sum of their resistances shows; here of unequal ones."""
     rho = _field.RHO_OHM_M
     apart = {"top_resistivity_ohm_m": 0.5 * rho, "bottom_resistivity_ohm_m": 1.5 * rho}

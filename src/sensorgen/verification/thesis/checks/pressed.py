@@ -19,7 +19,7 @@ from sensorgen.verification.thesis.checks._field import (
     RHO_OHM_M,
     WIDTH_M,
 )
-from sensorgen.verification.thesis.verdicts import ItemPart
+from sensorgen.verification.thesis.verdicts import ItemPart, Parts
 
 _FORCE_N, _PATCH_M, _LEFT_M, _MODULUS_PA = 3.0, 0.01, 0.045, 6e6  # Table 3.1; the tip of Table C.1 in the middle
 _S_PER_N = 0.02  # a piezoresistance that shows; no source gives one
@@ -42,7 +42,7 @@ def _z(**given: Any) -> Any:
     return line.impedance(line.PressedLine(**_TRACKS | given))
 
 
-def by_powers() -> list[ItemPart]:
+def by_powers() -> Parts:
     """2.24, 5.1, B.54: R from what the tracks turn into heat, X from what the film stores, per current squared."""
     nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
     x = (nodes + 1) / 2 * LENGTH_M
@@ -54,7 +54,7 @@ def by_powers() -> list[ItemPart]:
     )
 
 
-def corner() -> list[ItemPart]:
+def corner() -> Parts:
     """2.25: where R and the size of X are alike: of one R and one C, and of the line, whose R and C vary."""
     from scipy.optimize import brentq
 
@@ -68,46 +68,40 @@ def corner() -> list[ItemPart]:
     alike = float(np.exp(brentq(apart, np.log(_LEAST_HZ), np.log(_MOST_HZ), xtol=1e-14)))
     lowest = _z(frequency_hz=_TONES_HZ[0])
     by_lowest = -_TONES_HZ[0] * lowest.imag / lowest.real  # 1/(2 pi R C) of its R and C
-    return [
-        ItemPart("1/(2 pi R C), R of both tracks", "Hz", sensor.corner_frequency_hz(),
-                 1 / (2 * np.pi * _RESISTANCE_OHM * _CAPACITANCE_F)),
-        ItemPart("where R and |X| of the line are alike", "Hz", alike, float(by_lowest)),
-    ]  # fmt: skip
+    printed = 1 / (2 * np.pi * _RESISTANCE_OHM * _CAPACITANCE_F)
+    yield ItemPart("1/(2 pi R C), R of both tracks", "Hz", sensor.corner_frequency_hz(), printed)
+    yield ItemPart("where R and |X| of the line are alike", "Hz", alike, float(by_lowest))
 
 
-def by_frequency() -> list[ItemPart]:
+def by_frequency() -> Parts:
     """7.1.2: R hardly depends on the frequency, and X does; no numbers are given but the tones."""
     low, high = _z(frequency_hz=_TONES_HZ)
-    return [
-        ItemPart("change of R over that of |X|, 1.1 to 99.7 kHz", "", abs(np.log(high.real / low.real)) /
-                 abs(np.log(high.imag / low.imag)), 0.01, shown=3, limit=True),
-        ItemPart("X at 1.1 kHz over X at 99.7 kHz, by 1/f", "", low.imag / high.imag, _TONES_HZ[1] / _TONES_HZ[0]),
-    ]  # fmt: skip
+    changes = abs(np.log(high.real / low.real)) / abs(np.log(high.imag / low.imag))
+    yield ItemPart("change of R over that of |X|, 1.1 to 99.7 kHz", "", changes, 0.01, shown=3, limit=True)
+    yield ItemPart("X at 1.1 kHz over X at 99.7 kHz, by 1/f", "", low.imag / high.imag, _TONES_HZ[1] / _TONES_HZ[0])
 
 
-def thinner() -> list[ItemPart]:
+def thinner() -> Parts:
     """B.49: by the area of the electrodes, and by that under the tip."""
     stress = np.asarray(_FORCE_N / (WIDTH_M * _PATCH_M))
     ours = -float(compression.unconfined(_MODULUS_PA).capacitive_strain(stress)[0]) * FILM_M
     printed, corrected = (-_FORCE_N * FILM_M / (WIDTH_M * length * _MODULUS_PA) for length in (LENGTH_M, _PATCH_M))
-    return [ItemPart("change of thickness", "m", ours, printed, corrected)]
+    yield ItemPart("change of thickness", "m", ours, printed, corrected)
 
 
-def piezoresistive() -> list[ItemPart]:
+def piezoresistive() -> Parts:
     """B.50: a line that is pressed all along, of a rigid film, is one of more resistivity."""
     stiff = {"modulus_pa": 1e30, "tip_m": LENGTH_M, "force_n": _FORCE_N, "frequency_hz": _TONES_HZ}
     ours = _z(**stiff, top_piezoresistance_per_n=_S_PER_N, bottom_piezoresistance_per_n=_S_PER_N)
     return _field.both_parts("Z", "ohm", ours, _field.unpressed_ohm(RHO_OHM_M * (1 + _S_PER_N * _FORCE_N), _TONES_HZ))
 
 
-def three_sections() -> list[ItemPart]:
+def three_sections() -> Parts:
     """B.51: product of the three sections' matrices as in B.44 to B.47; and as textbooks have it."""
     ours = [complex(line.impedance(_under_tip(tone))) for tone in _TONES_HZ]
     printed, textbook = ([_product(tone, of) for tone in _TONES_HZ] for of in (_by_exponentials, _by_functions))
-    return [
-        *_field.both_parts("Z", "ohm", ours, printed),
-        *_field.both_parts("Z by cosh and sinh", "ohm", ours, textbook),
-    ]
+    yield from _field.both_parts("Z", "ohm", ours, printed)
+    yield from _field.both_parts("Z by cosh and sinh", "ohm", ours, textbook)
 
 
 def _under_tip(tone_hz: float) -> line.PressedLine:
@@ -133,7 +127,7 @@ def _by_functions(z: complex, zc: complex) -> Matrix:
     return np.array([[np.cosh(z), -np.sinh(z) * zc], [-np.sinh(z) / zc, np.cosh(z)]])
 
 
-def ladder() -> list[ItemPart]:
+def ladder() -> Parts:
     """2.3, 2.4, B.4, B.5: a chain of resistors and capacitors, each cell's capacitance halved between its ends."""
     given, admittance = _under_tip(_TONES_HZ[1]), 0j
     for r, y, length in reversed(list(zip(*read(given).sections(), strict=True))):
@@ -144,16 +138,16 @@ def ladder() -> list[ItemPart]:
     return _field.both_parts("Z", "ohm", line.impedance(given), 1 / admittance)
 
 
-def cog_resistance() -> list[ItemPart]:
+def cog_resistance() -> Parts:
     """2.9: a conductor of a cog's size, as our tracks count theirs."""
     height, width, across = 0.5e-3, 0.5e-3, 0.01
     sensor = Sensor(height, across, (width,) * 2, (RHO_OHM_M, 0.0), 1e-9, compression.unconfined(_MODULUS_PA))
-    return [ItemPart("R_c", "ohm", sensor.resistance_ohm(), RHO_OHM_M * height / (across * width))]
+    yield ItemPart("R_c", "ohm", sensor.resistance_ohm(), RHO_OHM_M * height / (across * width))
 
 
-def reactance_of(eps_r: float) -> list[ItemPart]:
+def reactance_of(eps_r: float) -> Parts:
     """2.6, 2.8: the size of a capacitor's reactance."""
     tone = float(_TONES_HZ[0])
     printed = FILM_M / (2 * np.pi * tone * EPS0_F_PER_M * eps_r * WIDTH_M * LENGTH_M)
     ours = _z(frequency_hz=tone, top_resistivity_ohm_m=0.0, bottom_resistivity_ohm_m=0.0, eps_r=eps_r)
-    return [ItemPart("size of X", "ohm", float(abs(ours)), printed)]
+    yield ItemPart("size of X", "ohm", float(abs(ours)), printed)

@@ -1,6 +1,5 @@
 """The solution of the line's equations by exponentials, and the transfer matrix: B.20 to B.48, B.52, B.53."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from sensorgen.verification.thesis.checks import _field
 from sensorgen.verification.thesis.checks._field import GAMMA, INPUT_V, LENGTH_M, LINE, PLACES_M, RHO_OHM_M, K
-from sensorgen.verification.thesis.verdicts import ItemPart
+from sensorgen.verification.thesis.verdicts import ItemPart, Parts
 
 HW = _field.AREA_M2
 _X = PLACES_M
@@ -49,129 +48,160 @@ def _printed(length_m: float) -> tuple[complex, complex, complex]:
     return complex(same), complex(a12), complex(a21)
 
 
-EQUATIONS: dict[str, Callable[[], list[ItemPart]]] = {
-    # B.20, B.21: the matrix applied to the potentials gives their second derivatives
-    "eigenvalue_problem": lambda: [
-        ItemPart("d2U/dx2", "V/m2", np.array([LINE.top_v(_X, 2), LINE.bottom_v(_X, 2)]),
-                 _MATRIX @ np.array([LINE.top_v(_X), LINE.bottom_v(_X)]))
-    ],
-    # B.25: the field's own rate of growth, and the eigenvalues of the matrix
-    "eigenvalues": lambda: [
-        ItemPart("lambda 3", "1/m", np.sqrt(np.mean(LINE.difference_v.at(_X, 2) / LINE.difference_v.at(_X))), K),
-        ItemPart("lambda 1, 2", "1/m", 0.0, np.sqrt(min(abs(np.linalg.eigvals(_MATRIX)))), scale=float(abs(K))),
-    ],
-    # B.24, B.28, B.40 and B.41: both potentials, along the line and at its end
-    "by_vectors": lambda: [ItemPart("U1(x)", "V", LINE.top_v(_X), INPUT_V / 2 + sum(_waves(_X)))],
-    "both_tracks": lambda: [
-        ItemPart("U1(x)", "V", LINE.top_v(_X), INPUT_V / 2 + sum(_waves(_X))),
-        ItemPart("U2(x)", "V", LINE.bottom_v(_X), INPUT_V / 2 - sum(_waves(_X))),
-    ],
-    "potentials_at_the_end": lambda: [
-        ItemPart("U1(L)", "V", LINE.top_v(LENGTH_M), INPUT_V / 2 + sum(_waves(LENGTH_M))),
-        ItemPart("U2(L)", "V", LINE.bottom_v(LENGTH_M), INPUT_V / 2 - sum(_waves(LENGTH_M))),
-    ],
-    # B.26: its exponents are exchanged
-    "with_exchanged_exponents": lambda: [
-        ItemPart("U1(x)", "V", LINE.top_v(_X),
-                 INPUT_V / 2 + (INPUT_V / 2 - _b4()) * np.exp(K * _X) + _b4() * np.exp(-K * _X),
-                 INPUT_V / 2 + sum(_waves(_X)))
-    ],
-    # B.29 to B.31
-    "at_the_contacts": lambda: [
-        ItemPart("U1(0)", "V", LINE.top_v(0.0), INPUT_V / 2 + sum(_apart())),
-        ItemPart("U2(0)", "V", LINE.bottom_v(0.0), INPUT_V / 2 - sum(_apart()), scale=INPUT_V),
-        ItemPart("B3 + B4", "V", sum(_apart()), INPUT_V / 2),
-    ],
-    # B.36, with the coefficients of the field; B.37; B.38
-    "input_current": lambda: [ItemPart("I_in", "A", LINE.input_a, HW / RHO_OHM_M * K * (_apart()[0] - _apart()[1]))],
-    "growing": lambda: [ItemPart("B4", "V", _apart()[1], _b4())],
-    "fading": lambda: [
-        ItemPart("B3", "V", _apart()[0],
-                 (np.sqrt(2) * LINE.input_a * RHO_OHM_M + HW * _ROOT * INPUT_V) / (4 * HW * _ROOT))
-    ],
-    # B.44 to B.47: elements of the transfer matrix
-    "first_element": lambda: _field.both_parts("A11", "", LINE.transfer(LENGTH_M)[0], _printed(LENGTH_M)[0]),
-    "second_element": lambda: _field.both_parts("A12", "ohm", LINE.transfer(LENGTH_M)[1], _printed(LENGTH_M)[1]),
-    "third_element": lambda: _field.both_parts("A21", "S", LINE.transfer(LENGTH_M)[2], _printed(LENGTH_M)[2]),
-}  # fmt: skip
+def eigenvalue_problem() -> Parts:
+    """B.20, B.21: the matrix applied to the potentials gives their second derivatives."""
+    yield ItemPart(
+        "d2U/dx2",
+        "V/m2",
+        np.array([LINE.top_v(_X, 2), LINE.bottom_v(_X, 2)]),
+        _MATRIX @ np.array([LINE.top_v(_X), LINE.bottom_v(_X)]),
+    )
 
 
-def general_solution() -> list[ItemPart]:
+def eigenvalues() -> Parts:
+    """B.25: the field's own rate of growth, and the eigenvalues of the matrix."""
+    yield ItemPart("lambda 3", "1/m", np.sqrt(np.mean(LINE.difference_v.at(_X, 2) / LINE.difference_v.at(_X))), K)
+    yield ItemPart("lambda 1, 2", "1/m", 0.0, np.sqrt(min(abs(np.linalg.eigvals(_MATRIX)))), scale=float(abs(K)))
+
+
+def by_vectors() -> Parts:
+    """B.24: the upper potential along the line."""
+    yield ItemPart("U1(x)", "V", LINE.top_v(_X), INPUT_V / 2 + sum(_waves(_X)))
+
+
+def both_tracks() -> Parts:
+    """B.28: both potentials along the line."""
+    yield ItemPart("U1(x)", "V", LINE.top_v(_X), INPUT_V / 2 + sum(_waves(_X)))
+    yield ItemPart("U2(x)", "V", LINE.bottom_v(_X), INPUT_V / 2 - sum(_waves(_X)))
+
+
+def potentials_at_the_end() -> Parts:
+    """B.40, B.41."""
+    yield ItemPart("U1(L)", "V", LINE.top_v(LENGTH_M), INPUT_V / 2 + sum(_waves(LENGTH_M)))
+    yield ItemPart("U2(L)", "V", LINE.bottom_v(LENGTH_M), INPUT_V / 2 - sum(_waves(LENGTH_M)))
+
+
+def with_exchanged_exponents() -> Parts:
+    """B.26: its exponents are exchanged."""
+    yield ItemPart(
+        "U1(x)",
+        "V",
+        LINE.top_v(_X),
+        INPUT_V / 2 + (INPUT_V / 2 - _b4()) * np.exp(K * _X) + _b4() * np.exp(-K * _X),
+        INPUT_V / 2 + sum(_waves(_X)),
+    )
+
+
+def at_the_contacts() -> Parts:
+    """B.29 to B.31."""
+    yield ItemPart("U1(0)", "V", LINE.top_v(0.0), INPUT_V / 2 + sum(_apart()))
+    yield ItemPart("U2(0)", "V", LINE.bottom_v(0.0), INPUT_V / 2 - sum(_apart()), scale=INPUT_V)
+    yield ItemPart("B3 + B4", "V", sum(_apart()), INPUT_V / 2)
+
+
+def input_current() -> Parts:
+    """B.36, with the coefficients of the field."""
+    yield ItemPart("I_in", "A", LINE.input_a, HW / RHO_OHM_M * K * (_apart()[0] - _apart()[1]))
+
+
+def growing() -> Parts:
+    """B.37."""
+    yield ItemPart("B4", "V", _apart()[1], _b4())
+
+
+def fading() -> Parts:
+    """B.38."""
+    yield ItemPart(
+        "B3", "V", _apart()[0], (np.sqrt(2) * LINE.input_a * RHO_OHM_M + HW * _ROOT * INPUT_V) / (4 * HW * _ROOT)
+    )
+
+
+def first_element() -> Parts:
+    """B.44, B.47: elements of the transfer matrix on its diagonal."""
+    return _field.both_parts("A11", "", LINE.transfer(LENGTH_M)[0], _printed(LENGTH_M)[0])
+
+
+def second_element() -> Parts:
+    """B.45."""
+    return _field.both_parts("A12", "ohm", LINE.transfer(LENGTH_M)[1], _printed(LENGTH_M)[1])
+
+
+def third_element() -> Parts:
+    """B.46."""
+    return _field.both_parts("A21", "S", LINE.transfer(LENGTH_M)[2], _printed(LENGTH_M)[2])
+
+
+def general_solution() -> Parts:
     """B.22, B.23: both potentials lie in what 1, x and two exponentials span."""
     places = np.linspace(0.0, LENGTH_M, 9)
     basis, wide = (np.stack([np.ones_like(x), x, np.exp(K * x), np.exp(-K * x)], -1) for x in (_X, places))
     top, bottom = (np.linalg.solve(basis, u(_X)) for u in (LINE.top_v, LINE.bottom_v))
-    return [
-        ItemPart("U1(x)", "V", LINE.top_v(places), wide @ top),
-        ItemPart("U2(x)", "V", LINE.bottom_v(places), wide @ bottom),
-    ]
+    yield ItemPart("U1(x)", "V", LINE.top_v(places), wide @ top)
+    yield ItemPart("U2(x)", "V", LINE.bottom_v(places), wide @ bottom)
 
 
-def eigenvectors() -> list[ItemPart]:
+def eigenvectors() -> Parts:
     """B.27: of the matrix of B.21; what changes along the line is opposite on both tracks, the rest is alike."""
     values, vectors = np.linalg.eig(_MATRIX)
     alike, opposite = (vectors[1, k] / vectors[0, k] for k in np.argsort(abs(values)))
-    return [ItemPart("U2 : U1 of lambda 1, 2", "", alike, 1.0), ItemPart("U2 : U1 of lambda 3, 4", "", opposite, -1.0)]
+    yield ItemPart("U2 : U1 of lambda 1, 2", "", alike, 1.0)
+    yield ItemPart("U2 : U1 of lambda 3, 4", "", opposite, -1.0)
 
 
-def slope_of_solution() -> list[ItemPart]:
+def slope_of_solution() -> Parts:
     """B.32."""
     fading, growing = _waves(_X)
-    return [
-        ItemPart("dU1/dx", "V/m", LINE.top_v(_X, order=1), K * (growing - fading)),
-        ItemPart("dU2/dx", "V/m", LINE.bottom_v(_X, order=1), K * (fading - growing)),
-    ]
+    yield ItemPart("dU1/dx", "V/m", LINE.top_v(_X, order=1), K * (growing - fading))
+    yield ItemPart("dU2/dx", "V/m", LINE.bottom_v(_X, order=1), K * (fading - growing))
 
 
-def currents() -> list[ItemPart]:
+def currents() -> Parts:
     """B.33 to B.35, at places where there is a current: at L it is 0."""
     (fading, growing), ours = _waves(_X), LINE.current_a.at(_X)
     printed = HW / RHO_OHM_M * K * (fading - growing)
-    return [ItemPart("I1", "A", ours, printed), ItemPart("I2", "A", -ours, -printed)]
+    yield ItemPart("I1", "A", ours, printed)
+    yield ItemPart("I2", "A", -ours, -printed)
 
 
-def output_current() -> list[ItemPart]:
+def output_current() -> Parts:
     """B.39."""
     first = 2 * (1 + _E**2) * _ANY_A * RHO_OHM_M
     second = np.sqrt(2) * (-1 + _E**2) * HW * _ROOT * INPUT_V
     printed, corrected = (complex((first + sign * second) / _E / (4 * RHO_OHM_M)) for sign in (1, -1))
-    return [ItemPart("I_out", "A", _behind(LENGTH_M, _ANY_A)[1], printed, corrected)]
+    yield ItemPart("I_out", "A", _behind(LENGTH_M, _ANY_A)[1], printed, corrected)
 
 
-def output_voltage() -> list[ItemPart]:
+def output_voltage() -> Parts:
     """B.42: Gamma stands for its root."""
     first = -np.sqrt(2) * (-1 + _E**2) * _ANY_A * RHO_OHM_M
     second = (1 + _E**2) * HW * INPUT_V
     printed, corrected = (complex((first + second * g) / _E / (2 * HW * g)) for g in (GAMMA, _ROOT))
-    return [ItemPart("U_out", "V", _behind(LENGTH_M, _ANY_A)[0], printed, corrected)]
+    yield ItemPart("U_out", "V", _behind(LENGTH_M, _ANY_A)[0], printed, corrected)
 
 
-def transfer() -> list[ItemPart]:
+def transfer() -> Parts:
     """B.43: the matrix takes the line's input to its field further on."""
     x = float(_X[2])
     same, a12, a21 = _printed(x)
-    return [
-        ItemPart("U", "V", LINE.difference_v.at(x), same * INPUT_V + a12 * LINE.input_a),
-        ItemPart("I", "A", LINE.current_a.at(x), a21 * INPUT_V + same * LINE.input_a),
-    ]
+    yield ItemPart("U", "V", LINE.difference_v.at(x), same * INPUT_V + a12 * LINE.input_a)
+    yield ItemPart("I", "A", LINE.current_a.at(x), a21 * INPUT_V + same * LINE.input_a)
 
 
-def matrix() -> list[ItemPart]:
+def matrix() -> Parts:
     """B.48: its third element has a root that goes too far."""
     too_far = -(_E**2 - 1) / _E * _ROOT * HW / (2 * np.sqrt(2 * RHO_OHM_M))
     (same, a12, a21), ours = _printed(LENGTH_M), LINE.transfer(LENGTH_M)
-    return [
-        ItemPart("A11", "", ours[0], same), ItemPart("A12", "ohm", ours[1], a12),
-        ItemPart("A21", "S", ours[2], too_far, a21),
-    ]  # fmt: skip
+    yield ItemPart("A11", "", ours[0], same)
+    yield ItemPart("A12", "ohm", ours[1], a12)
+    yield ItemPart("A21", "S", ours[2], too_far, a21)
 
 
-def no_output() -> list[ItemPart]:
+def no_output() -> Parts:
     """B.52, with the elements as printed and the line's own current."""
     same, _, a21 = _printed(LENGTH_M)
-    return [ItemPart("A21 U_in : A22 I_in", "", -1.0, np.real(a21 * INPUT_V / (same * LINE.input_a)))]
+    yield ItemPart("A21 U_in : A22 I_in", "", -1.0, np.real(a21 * INPUT_V / (same * LINE.input_a)))
 
 
-def whole() -> list[ItemPart]:
+def whole() -> Parts:
     """2.18, B.53."""
     return _field.both_parts("Z", "ohm", LINE.impedance_ohm, _field.unpressed_ohm())

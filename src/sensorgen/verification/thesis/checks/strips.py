@@ -18,7 +18,7 @@ from sensorgen.verification.thesis.checks._columns import (
     piles_f,
 )
 from sensorgen.verification.thesis.items import table
-from sensorgen.verification.thesis.verdicts import ItemPart
+from sensorgen.verification.thesis.verdicts import ItemPart, Parts
 
 _CELL = rect.Params(dielectric_mm=FILM_MM)
 _AREA_M2 = (_CELL.period_mm * M_PER_MM) ** 2
@@ -33,25 +33,21 @@ _PRINTED_MM = {
 }
 
 
-def columns(below: str, above: str = "") -> list[ItemPart]:
+def columns(below: str, above: str = "") -> Parts:
     """3.39 to 3.48: one column over a kind of lower strip, or all, per area."""
-    parts = []
     for name in [above] if above else _PRINTED_MM[below]:
         over: list[Layer] = [(below, _T2), *([(name, _T1)] if name != "etpu" else [])] if below != "etpu" else []
         printed = EPS0_F_PER_M * EPS_R / (_PRINTED_MM[below][name] * M_PER_MM)
-        parts.append(ItemPart(f"{name} over {below}", "F/m2", pile_f_per_m2([("x60", _D), *over]), printed))
-    return parts
+        yield ItemPart(f"{name} over {below}", "F/m2", pile_f_per_m2([("x60", _D), *over]), printed)
 
 
-def in_series() -> list[ItemPart]:
+def in_series() -> Parts:
     """3.37, 3.38: two dielectrics on one another, the second of air."""
     h1, h2 = 0.1, 0.3
     one, two = EPS0_F_PER_M * EPS_R, EPS0_F_PER_M
     ours = pile_f_per_m2([("x60", h1), ("air", h2)])
-    return [
-        ItemPart("C per area by 3.37", "F/m2", ours, 1 / (h1 * M_PER_MM / one + h2 * M_PER_MM / two)),
-        ItemPart("C per area by 3.38", "F/m2", ours, one * two / ((one * h2 + two * h1) * M_PER_MM)),
-    ]
+    yield ItemPart("C per area by 3.37", "F/m2", ours, 1 / (h1 * M_PER_MM / one + h2 * M_PER_MM / two))
+    yield ItemPart("C per area by 3.38", "F/m2", ours, one * two / ((one * h2 + two * h1) * M_PER_MM))
 
 
 def _summed_f(upper_mm: dict[str, float]) -> float:
@@ -77,23 +73,19 @@ def _columns_f(cell: rect.Params = _CELL) -> float:
     return every_column.capacitance(design.in_use, PERMITTIVITY).lower
 
 
-def sixteen_columns() -> list[ItemPart]:
+def sixteen_columns() -> Parts:
     """3.36, figure 3.6: the sum over the lower strips, each of the upper ones with its own width."""
     formula = thesis_cells.strips_f_per_m2(_CELL, EPS_R, even=False) * _AREA_M2
-    return [
-        ItemPart("C_eq", "F", _columns_f(), _summed_f(_OWN_MM)),
-        ItemPart("as kept in thesis_cells", "F", formula, _summed_f(_OWN_MM), copied=True),
-    ]
+    yield ItemPart("C_eq", "F", _columns_f(), _summed_f(_OWN_MM))
+    yield ItemPart("as kept in thesis_cells", "F", formula, _summed_f(_OWN_MM), copied=True)
 
 
-def whole() -> list[ItemPart]:
+def whole() -> Parts:
     """3.49: the formula, and its cell."""
     printed, formula = _summed_f(_EVEN_MM), thesis_cells.strips_f_per_m2(_CELL, EPS_R) * _AREA_M2
-    return [
-        ItemPart("C_eq, columns of their own widths", "F", _columns_f(), printed),
-        ItemPart("of the exact cell", "F", exact_f_per_m2("rect") * _AREA_M2, printed, shown=SHOWN),
-        ItemPart("as kept in thesis_cells", "F", formula, printed, copied=True),
-    ]
+    yield ItemPart("C_eq, columns of their own widths", "F", _columns_f(), printed)
+    yield ItemPart("of the exact cell", "F", exact_f_per_m2("rect") * _AREA_M2, printed, shown=SHOWN)
+    yield ItemPart("as kept in thesis_cells", "F", formula, printed, copied=True)
 
 
 def _hooke() -> tuple[float, float]:
@@ -116,62 +108,49 @@ def _kept(dh_mm: float) -> float:
     return pressed / free - 1
 
 
-def constant_volume() -> list[ItemPart]:
+def constant_volume() -> Parts:
     """3.50 to 3.52: the bulge that keeps the area of the cross-section, against Hooke's law."""
     wide, high = _hooke()
     bulge = _STRAIN / (1 - _STRAIN)  # 3.51
     printed = (1 + bulge) / (1 - _STRAIN) - 1
-    return [
-        ItemPart("change of area over the strain", "", (wide * high - 1) / _STRAIN, 0.0, scale=1.0),
-        ItemPart("bulge over width", "", wide - 1, bulge),
-        ItemPart("gain of capacitance", "", _gain(), printed),
-        ItemPart("gain as kept in thesis_cells", "", _kept(_STRAIN * (_T1 + _T2 + _D)), printed, copied=True),
-    ]
+    yield ItemPart("change of area over the strain", "", (wide * high - 1) / _STRAIN, 0.0, scale=1.0)
+    yield ItemPart("bulge over width", "", wide - 1, bulge)
+    yield ItemPart("gain of capacitance", "", _gain(), printed)
+    yield ItemPart("gain as kept in thesis_cells", "", _kept(_STRAIN * (_T1 + _T2 + _D)), printed, copied=True)
 
 
-def bulging_term() -> list[ItemPart]:
+def bulging_term() -> Parts:
     """3.53: the square belongs to the bracket. Lengths are in metres: as printed, that matters."""
     h1 = (_T1 + _T2 + _D) * M_PER_MM
     dh = h1 * _STRAIN
-    return [ItemPart("gain of capacitance", "", _gain(), h1 / (h1 - dh**2) - 1, (h1 / (h1 - dh)) ** 2 - 1)]
+    yield ItemPart("gain of capacitance", "", _gain(), h1 / (h1 - dh**2) - 1, (h1 / (h1 - dh)) ** 2 - 1)
 
 
-def bulging() -> list[ItemPart]:
+def bulging() -> Parts:
     """3.54: what it adds to a cell that nothing presses: columns of their own widths have no such term."""
     area_mm2 = _CELL.x60_width_mm * _CELL.period_mm / 4
     added = 8 / 16 * EPS0_F_PER_M * EPS_R * area_mm2 / (_T1 + _T2 + _D) * M_PER_MM
     rest = _summed_f(_EVEN_MM)
     formula = [thesis_cells.bulging_f_per_m2(_CELL, EPS_R, 0.0, printed=way) * _AREA_M2 for way in (False, True)]
-    return [
-        ItemPart("C_r at rest, strips of their own widths", "F", _columns_f(), _summed_f(_OWN_MM) + added),
-        ItemPart("as kept in thesis_cells, corrected and not", "F", formula, [rest, rest + added], copied=True),
-    ]
+    yield ItemPart("C_r at rest, strips of their own widths", "F", _columns_f(), _summed_f(_OWN_MM) + added)
+    yield ItemPart("as kept in thesis_cells, corrected and not", "F", formula, [rest, rest + added], copied=True)
 
 
-def turned_out(rise_f: float, press_mm: float) -> list[ItemPart]:
+def turned_out(rise_f: float, press_mm: float) -> Parts:
     """Figure 6.10: what the strips gain that 3.1.2 makes lower and wider, by columns of these."""
     now = thesis_cells.swept(_CELL, press_mm)
     rise = _columns_f(now) - _columns_f()
-    return [
-        ItemPart("gain by 5 µm, a cell of 2 mm by 2 mm", "F", rise, rise_f, shown=SHOWN),
-        ItemPart(
-            "gain by 5 µm, the square of 1 mm that 6.1.2 names", "F", rise / _CELL.period_mm**2, rise_f, shown=SHOWN
-        ),
-    ]
+    yield ItemPart("gain by 5 µm, a cell of 2 mm by 2 mm", "F", rise, rise_f, shown=SHOWN)
+    square = rise / _CELL.period_mm**2
+    yield ItemPart("gain by 5 µm, the square of 1 mm that 6.1.2 names", "F", square, rise_f, shown=SHOWN)
 
 
-def volumes() -> list[ItemPart]:
+def volumes() -> Parts:
     """2.4.1: X60 and cogs of both designs per area: of a triangle half its box, of a strip its share of the period."""
     cell = tri.Params(dielectric_mm=FILM_MM)
     x60 = (cell.hang_height_mm + cell.lower_height_mm) / 2 + FILM_MM
     cogs = cell.hang_height_mm / 2
     layers = (_T1 + _T2) / _CELL.period_mm
-    return [
-        ItemPart(
-            "X60 of the triangular design over that of the rectangular one",
-            "",
-            x60 / (layers * _CELL.x60_width_mm + _D),
-            1.0,
-        ),
-        ItemPart("cogs, likewise", "", cogs / (layers * _CELL.etpu_width_mm), 1.0),
-    ]
+    more = x60 / (layers * _CELL.x60_width_mm + _D)
+    yield ItemPart("X60 of the triangular design over that of the rectangular one", "", more, 1.0)
+    yield ItemPart("cogs, likewise", "", cogs / (layers * _CELL.etpu_width_mm), 1.0)

@@ -1,6 +1,5 @@
 """The triangular cell: 2.10, 3.5, 3.9 to 3.35, figures 3.1, 3.4 and 6.7, against columns and field solvers."""
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -25,7 +24,7 @@ from sensorgen.verification.thesis.checks._columns import (
     pile_f_per_m2,
 )
 from sensorgen.verification.thesis.checks._field import OMEGA
-from sensorgen.verification.thesis.verdicts import ItemPart
+from sensorgen.verification.thesis.verdicts import ItemPart, Parts
 
 _CELL = tri.Params(dielectric_mm=FILM_MM)
 _DESIGN = designs.make({"shape": "tri", "parameters": {"dielectric_mm": FILM_MM}})
@@ -106,72 +105,96 @@ def _logarithm(region: _Region, denominator: float) -> float:
 
 _SOLID, _COG = _UNDER["dielectric"], _UNDER["cog"]
 _FILM_M, _GAP_M = _Y2_M + _D_M, _Y1_M - _Y2_M  # X60 below the air, and the air, at the places
-EQUATIONS: dict[str, Callable[[], list[ItemPart]]] = {
-    # 3.10, 3.11, 3.20: faces of the gap
-    "upper_flank": lambda: [ItemPart("y1", "m", _faces_mm()[0] * M_PER_MM, _Y1_M)],
-    "lower_flank": lambda: [ItemPart("y2", "m", _faces_mm()[1] * M_PER_MM, _Y2_M)],
-    "gap": lambda: [
-        ItemPart("y1 - y2", "m", np.subtract(*_faces_mm()) * M_PER_MM, _X_MM * M_PER_MM * (_TAN_GAMMA - _TAN_THETA))
-    ],
-    # 3.12, 3.13: fields by thicknesses add up to the voltage; 3.14, 3.15; 3.16 to 3.18: per area, at 1 V
-    "voltage": lambda: [
-        ItemPart("V", "V", _VOLT,
-                 _SOLID.displacement() * ((_T_M - _Y1_M + _FILM_M) / _DISPLACED + _GAP_M / EPS0_F_PER_M))
-    ],
-    "field_in_air": lambda: [
-        ItemPart("E_air", "V/m", _SOLID.displacement() / EPS0_F_PER_M,
-                 _VOLT * EPS_R / ((_T_M - _Y1_M) + EPS_R * _GAP_M + _FILM_M))
-    ],
-    "displacement": lambda: [
-        ItemPart("D", "C/m2", _SOLID.displacement(), _DISPLACED * _VOLT / ((_T_M + _D_M) + (EPS_R - 1) * _GAP_M))
-    ],
-    # 3.25, with air as medium 2 and X60 as 3; 3.27 to 3.29
-    "voltage_under_cog": lambda: [
-        ItemPart("V", "V", _VOLT, _COG.displacement() * (_GAP_M / EPS0_F_PER_M + _FILM_M / _DISPLACED))
-    ],
-    "displacement_under_cog": lambda: [
-        ItemPart("D", "C/m2", _COG.displacement(), _DISPLACED * _VOLT / (EPS_R * _Y1_M + _D_M + (1 - EPS_R) * _Y2_M))
-    ],
-    # 3.23, 3.24; 3.33, 3.34: alpha stands for beta below the fraction
-    "logarithm_under_dielectric": lambda: [
-        ItemPart("C_wd", "F/m", _SOLID.flank_f_per_m(), _logarithm(_SOLID, _SOLID.beta_m)), _SOLID.formula(),
-    ],
-    "logarithm_under_cog": lambda: [
-        ItemPart("C_we", "F/m", _COG.flank_f_per_m(), _logarithm(_COG, _COG.alpha), _logarithm(_COG, _COG.beta_m)),
-        _COG.formula(),
-    ],
-}  # fmt: skip
 
 
-def continuity() -> list[ItemPart]:
+def upper_flank() -> Parts:
+    """3.10: upper face of the gap."""
+    yield ItemPart("y1", "m", _faces_mm()[0] * M_PER_MM, _Y1_M)
+
+
+def lower_flank() -> Parts:
+    """3.11: lower face of the gap."""
+    yield ItemPart("y2", "m", _faces_mm()[1] * M_PER_MM, _Y2_M)
+
+
+def gap() -> Parts:
+    """3.20: height of the gap."""
+    yield ItemPart("y1 - y2", "m", np.subtract(*_faces_mm()) * M_PER_MM, _X_MM * M_PER_MM * (_TAN_GAMMA - _TAN_THETA))
+
+
+def voltage() -> Parts:
+    """3.12, 3.13: fields by thicknesses add up to the voltage."""
+    yield ItemPart(
+        "V", "V", _VOLT, _SOLID.displacement() * ((_T_M - _Y1_M + _FILM_M) / _DISPLACED + _GAP_M / EPS0_F_PER_M)
+    )
+
+
+def field_in_air() -> Parts:
+    """3.14, 3.15, at 1 V."""
+    yield ItemPart(
+        "E_air",
+        "V/m",
+        _SOLID.displacement() / EPS0_F_PER_M,
+        _VOLT * EPS_R / ((_T_M - _Y1_M) + EPS_R * _GAP_M + _FILM_M),
+    )
+
+
+def displacement() -> Parts:
+    """3.16 to 3.18: per area, at 1 V."""
+    yield ItemPart("D", "C/m2", _SOLID.displacement(), _DISPLACED * _VOLT / ((_T_M + _D_M) + (EPS_R - 1) * _GAP_M))
+
+
+def voltage_under_cog() -> Parts:
+    """3.25, with air as medium 2 and X60 as 3."""
+    yield ItemPart("V", "V", _VOLT, _COG.displacement() * (_GAP_M / EPS0_F_PER_M + _FILM_M / _DISPLACED))
+
+
+def displacement_under_cog() -> Parts:
+    """3.27 to 3.29."""
+    yield ItemPart("D", "C/m2", _COG.displacement(), _DISPLACED * _VOLT / (EPS_R * _Y1_M + _D_M + (1 - EPS_R) * _Y2_M))
+
+
+def logarithm_under_dielectric() -> Parts:
+    """3.23, 3.24."""
+    yield ItemPart("C_wd", "F/m", _SOLID.flank_f_per_m(), _logarithm(_SOLID, _SOLID.beta_m))
+    yield _SOLID.formula()
+
+
+def logarithm_under_cog() -> Parts:
+    """3.33, 3.34: alpha stands for beta below the fraction."""
+    yield ItemPart("C_we", "F/m", _COG.flank_f_per_m(), _logarithm(_COG, _COG.alpha), _logarithm(_COG, _COG.beta_m))
+    yield _COG.formula()
+
+
+def continuity() -> Parts:
     """3.9: the field in air from that in X60, and from the voltage that the X60 leaves to the air."""
     solid = _SOLID.displacement() / _DISPLACED
-    return [ItemPart("E in air", "V/m", (_VOLT - solid * (_T_M - _Y1_M + _FILM_M)) / _GAP_M, EPS_R * solid)]
+    yield ItemPart("E in air", "V/m", (_VOLT - solid * (_T_M - _Y1_M + _FILM_M)) / _GAP_M, EPS_R * solid)
 
 
-def field_under_cog() -> list[ItemPart]:
+def field_under_cog() -> Parts:
     """3.26: what 3.25 leaves for medium 2."""
     d = _COG.displacement()
     ours = (_VOLT - d / _DISPLACED * _FILM_M) / _GAP_M
-    return [ItemPart("E2", "V/m", ours, d / EPS0_F_PER_M / EPS_R, d / EPS0_F_PER_M)]
+    yield ItemPart("E2", "V/m", ours, d / EPS0_F_PER_M / EPS_R, d / EPS0_F_PER_M)
 
 
-def alpha(under: str) -> list[ItemPart]:
+def alpha(under: str) -> Parts:
     """3.21, 3.30."""
-    return [ItemPart("alpha", "", _UNDER[under].reduced()[0], _UNDER[under].alpha)]
+    yield ItemPart("alpha", "", _UNDER[under].reduced()[0], _UNDER[under].alpha)
 
 
-def beta(under: str) -> list[ItemPart]:
+def beta(under: str) -> Parts:
     """3.22, 3.31."""
-    return [ItemPart("beta", "m", _UNDER[under].reduced()[1], _UNDER[under].beta_m)]
+    yield ItemPart("beta", "m", _UNDER[under].reduced()[1], _UNDER[under].beta_m)
 
 
-def integral(under: str) -> list[ItemPart]:
+def integral(under: str) -> Parts:
     """3.19, 3.32, by quadrature."""
     region, width = _UNDER[under], _QUARTER_MM * M_PER_MM
     nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
     columns_under = _DISPLACED / (region.beta_m + region.alpha * (nodes + 1) / 2 * width)
-    return [ItemPart("C", "F/m", region.flank_f_per_m(), float(np.sum(weights * columns_under) * width / 2))]
+    yield ItemPart("C", "F/m", region.flank_f_per_m(), float(np.sum(weights * columns_under) * width / 2))
 
 
 def _half_f_per_m() -> float:
@@ -179,31 +202,29 @@ def _half_f_per_m() -> float:
     return columns.capacitance(_DESIGN.in_use, PERMITTIVITY).lower / _AREA_M2 * _CELL.period_mm / 2 * M_PER_MM
 
 
-def parallel() -> list[ItemPart]:
+def parallel() -> Parts:
     """2.10, 2.13: impedances of both flanks by the corrected logarithms, side by side, per depth of 1 m."""
     one, two = (1 / (1j * OMEGA * _logarithm(region, region.beta_m)) for region in _UNDER.values())
-    return [ItemPart("Z_t", "ohm", 1 / (1j * OMEGA * _half_f_per_m()), one * two / (one + two))]
+    yield ItemPart("Z_t", "ohm", 1 / (1j * OMEGA * _half_f_per_m()), one * two / (one + two))
 
 
-def whole() -> list[ItemPart]:
+def whole() -> Parts:
     """3.35: columns agree with columns; the field that leaves the flanks sideways is not in them."""
     half = _CELL.period_mm / 2 * M_PER_MM
     printed = sum(_logarithm(region, region.beta_m) for region in _UNDER.values())
     formula = thesis_cells.triangles_f_per_m2(_CELL, EPS_R) * half
-    return [
-        ItemPart("C_tot of half a period, columns", "F/m", _half_f_per_m(), printed),
-        ItemPart("of the exact cell", "F/m", exact_f_per_m2("tri") * half, printed, shown=SHOWN),
-        ItemPart("as kept in thesis_cells", "F/m", formula, printed, copied=True),
-    ]
+    yield ItemPart("C_tot of half a period, columns", "F/m", _half_f_per_m(), printed)
+    yield ItemPart("of the exact cell", "F/m", exact_f_per_m2("tri") * half, printed, shown=SHOWN)
+    yield ItemPart("as kept in thesis_cells", "F/m", formula, printed, copied=True)
 
 
-def gauss() -> list[ItemPart]:
+def gauss() -> Parts:
     """3.5: flux through the electrode, by a solution whose flux has no sources, and by one whose field has no curl."""
     bounds = fem2d.capacitance(_DESIGN.in_use, PERMITTIVITY)
-    return [ItemPart("charge by the flux over charge by the potential", "", 1.0, bounds.lower / bounds.upper)]
+    yield ItemPart("charge by the flux over charge by the potential", "", 1.0, bounds.lower / bounds.upper)
 
 
-def coarse() -> list[ItemPart]:
+def coarse() -> Parts:
     """Table 3.3: the cell on triangles of at most 1 mm, one across its film, with quadratic elements."""
     (section,) = sections(_DESIGN.in_use)
     few = cut(cell(section, _DESIGN.in_use.size_mm[2]))
@@ -213,10 +234,10 @@ def coarse() -> list[ItemPart]:
     shares = [share for _, share in few.regions]
     c = EPS0_F_PER_M * float((eps * field.energies(u, u)) @ shares)
     exact = exact_f_per_m2("tri") * _AREA_M2 / (section.depth_mm * M_PER_MM)
-    return [ItemPart("C on such a mesh over C of the exact cell", "", c / exact, shown=SHOWN)]
+    yield ItemPart("C on such a mesh over C of the exact cell", "", c / exact, shown=SHOWN)
 
 
-def swept(rise_f: float, deepest_mm: float, depth_mm: float) -> list[ItemPart]:
+def swept(rise_f: float, deepest_mm: float, depth_mm: float) -> Parts:
     """Figure 6.7: displacement for a rise of C, by the field on the geometry that 3.1.2 makes."""
 
     def c_f(press_mm: float) -> float:
@@ -228,9 +249,6 @@ def swept(rise_f: float, deepest_mm: float, depth_mm: float) -> list[ItemPart]:
     rest, places = c_f(0.0), np.array([0.0, 0.05, 0.1, 0.15, 0.2])
     rises = [c_f(mm) - rest for mm in places.tolist()]
     down = float(np.interp(rise_f, rises, places, right=np.nan)) * M_PER_MM
-    return [
-        ItemPart(
-            "displacement at which the cell has gained 1 pF", "m", down, deepest_mm * M_PER_MM, shown=SHOWN, limit=True
-        ),
-        ItemPart("gain at 0.2 mm; all air is gone at 0.352 mm", "F", rises[-1], shown=SHOWN),
-    ]
+    name = "displacement at which the cell has gained 1 pF"
+    yield ItemPart(name, "m", down, deepest_mm * M_PER_MM, shown=SHOWN, limit=True)
+    yield ItemPart("gain at 0.2 mm; all air is gone at 0.352 mm", "F", rises[-1], shown=SHOWN)
