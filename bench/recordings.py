@@ -79,10 +79,10 @@ def offset_table():
     with tempfile.TemporaryDirectory() as folder:
         for count in (3, 10, 30, 100):
             found, run = joined_run(Path(folder), made.presses(count), 12.34, 0.0)
-            off = found.offset_s - 12.34 - 0.03
+            off = found.clocks.offset_s - 12.34 - 0.03
             yield (
-                f"| {count} | {run.time_s[-1]:.0f} | {off * 1e3:.2f} | {found.offset_error_s * 1e3:.2f} | "
-                f"{found.explained:.3f} |"
+                f"| {count} | {run.time_s[-1]:.0f} | {off * 1e3:.2f} | {found.clocks.offset_error_s * 1e3:.2f} | "
+                f"{found.clocks.explained:.3f} |"
             )
 
 
@@ -95,7 +95,8 @@ def slow_table():
             found, _ = joined_run(
                 Path(folder), made.presses(12, dwell_s=4.0), 12.34, 0.0, law=made.answering(0.01, tau), ramp_s=ramp
             )
-            yield f"| {tau:g} | {ramp:g} | {(found.offset_s - 12.37) * 1e3:.2f} | {found.offset_error_s * 1e3:.2f} |"
+            off, error = found.clocks.offset_s - 12.37, found.clocks.offset_error_s
+            yield f"| {tau:g} | {ramp:g} | {off * 1e3:.2f} | {error * 1e3:.2f} |"
 
 
 def joined_run(folder, plan, offset_s, skew, **how):
@@ -136,7 +137,7 @@ def demodulation_table():
             steps = [1.05 * np.abs(x).max() / 2 ** (bits - 1) for x in shown]
             shown = [np.round(x / q + rng.uniform(-0.5, 0.5, len(x))) * q for x, q in zip(shown, steps, strict=True)]
         start = time.process_time()
-        found = waveform.impedance(*shown, rate, made.TONES_HZ, 1e9, 1e9).impedance_ohm / z
+        found = impedance(shown, rate) / z
         spent = time.process_time() - start
         one, mean = (rms(x) for x in (found - 1, found.reshape(seconds, 100, 7).mean(axis=1) - 1))
         yield f"| {bits or 'all'} | {one.min():.1e}, {one.max():.1e} | {mean.min():.1e}, {mean.max():.1e} |"
@@ -148,12 +149,21 @@ def demodulation_table():
         yield f"| {rate / slower:.3g} | {round(rate / slower * 0.01)} | {speed(many, rate / slower):.0f} |"
 
 
+def impedance(shown, rate):
+    """Impedances of all windows of voltage and current, clipping looked for."""
+    size = waveform.window_samples(rate, made.TONES_HZ)
+    u, i = (waveform.phasors(each, rate, made.TONES_HZ, size) for each in shown)
+    for each in shown:
+        waveform.clipped(each, 1e9, size, len(u))
+    return u / i
+
+
 def speed(shown, rate):
     """Of demodulation, over the time that the waveforms last: the middle of five."""
     spent = []
     for _ in range(5):
         start = time.process_time()
-        waveform.impedance(*shown, rate, made.TONES_HZ, 1e9, 1e9)
+        impedance(shown, rate)
         spent.append(time.process_time() - start)
     return len(shown[0]) / rate / sorted(spent)[2]
 

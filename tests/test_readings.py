@@ -217,10 +217,18 @@ def test_a_block_of_the_standard_input_is_what_has_come(monkeypatch):
             assert [block.rows for block in blocks] == [[7]]
 
 
+class Trickle(io.BytesIO):
+    """A stream that gives five bytes at a time, as a pipe may."""
+
+    def read1(self, size=-1):
+        return self.read(5)
+
+
+@pytest.mark.parametrize("kind", [io.BytesIO, Trickle])
 @pytest.mark.parametrize("limit", [1, 3, 7, 100])
-def test_lines_of_a_stream_are_those_of_a_file(limit):
+def test_lines_of_a_stream_are_those_of_a_file(limit, kind):
     text = "a,b\n1,2\n\nlonger than the limit\r\nno end"
-    stream, file = Waiting(io.BytesIO(text.encode())), io.StringIO(text, newline="\n")
+    stream, file = Waiting(kind(text.encode())), io.StringIO(text, newline="\n")
     assert [stream.readline(limit) for _ in text] == [file.readline(limit) for _ in text]
 
 

@@ -11,7 +11,8 @@ from sensorgen.core.errors import BadInput, NotInstalled, OutOfRange
 from sensorgen.measure.lab.devices import DeviceFault, RealClock, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.handyscope import Bridge, Handyscope, gains, load
 from sensorgen.measure.signal.waveform import TONES_HZ, WEIGHTS, multisine
-from sensorgen.measure.virtual.handyscope import FAULTS, SERIAL, Analyser, PhasorMeter
+from sensorgen.measure.virtual.faults import BY_DEVICE
+from sensorgen.measure.virtual.handyscope import SERIAL, Analyser, PhasorMeter
 
 TONES = np.array(TONES_HZ)
 SILENT = Analyser(noise_a=0.0)
@@ -162,7 +163,7 @@ FAULT_TEXT = {
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("fault", BY_DEVICE["analyser"])
 @pytest.mark.parametrize("kind", ["samples", "phasors"])
 def test_each_fault_is_reported(fault, kind):
     clock, scope, meter = rig()

@@ -12,7 +12,8 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.measure.lab import reprap
 from sensorgen.measure.lab.devices import DeviceFault, RealClock, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.port import HttpPort, SerialPort, SimulatedPort, faults
-from sensorgen.measure.virtual.reprap import FAULTS, RepRapFirmware
+from sensorgen.measure.virtual.faults import BY_DEVICE
+from sensorgen.measure.virtual.reprap import RepRapFirmware
 
 WAYS = ("serial", "http")
 
@@ -205,7 +206,7 @@ SEEN = {
 
 
 def test_every_fault_of_the_simulator_is_tried():
-    assert {*SEEN, "stuck", "identity"} == set(FAULTS)
+    assert {*SEEN, "stuck", "identity"} == set(BY_DEVICE["stage"])
 
 
 @pytest.mark.parametrize("way", WAYS)

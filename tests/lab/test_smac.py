@@ -11,7 +11,8 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.measure.lab import smac
 from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.port import SerialPort, SimulatedPort
-from sensorgen.measure.virtual.smac import FAULTS, SmacController
+from sensorgen.measure.virtual.faults import BY_DEVICE
+from sensorgen.measure.virtual.smac import SmacController
 
 ASKED = b"32 R 0x1000\r32 R 0x11018\r"
 
@@ -201,7 +202,7 @@ SEEN = {
 
 
 def test_every_fault_of_the_simulator_is_tried():
-    assert set(SEEN) == set(FAULTS)
+    assert set(SEEN) == set(BY_DEVICE["actuator"])
 
 
 @pytest.mark.parametrize("fault", [name for name, message in SEEN.items() if message])

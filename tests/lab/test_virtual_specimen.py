@@ -13,7 +13,7 @@ from sensorgen.measure.virtual import blank as tables
 from sensorgen.measure.virtual.blank import blank, tracks
 from sensorgen.measure.virtual.cell import AIR, EPSILON_0, SectionRaster, Solid, capacitance, conductance, pressed
 from sensorgen.measure.virtual.section import raster
-from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, decades, drawn
+from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, drawn
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 TONES_HZ = np.array([1.1e3, 10.1e3, 99.7e3])
@@ -191,7 +191,7 @@ def test_it_remembers(tri):
     worn = replace(tri, truth=Truth(hysteresis=0.05, creep=0.02))
     plain = worn.rise(2.0, 5e-3)
     assert worn.rise(2.0, 5e-3, unloading=0.5) / plain == pytest.approx(1.025)
-    assert worn.rise(2.0, 5e-3, decades=decades(10.0)) / plain == pytest.approx(1.02)
+    assert worn.rise(2.0, 5e-3, decades=1.0) / plain == pytest.approx(1.02)
     assert worn.rise(0.0, 5e-3) == 0.0
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from sensorgen.analysis.calibration import Bench, spread_of
 from sensorgen.design.design import make
-from sensorgen.measure.virtual.specimen import PressedSpecimen, decades, drawn
+from sensorgen.measure.virtual.specimen import PressedSpecimen, drawn
 from sensorgen.prediction import bodies
 from sensorgen.prediction.calibration.calibration import inside
 from sensorgen.prediction.calibration.fitting import Data, calibrated
@@ -67,7 +67,7 @@ def session(specimen, count, seed):
     rest, under = np.empty((2, count, 7), complex)
     for k in range(count):
         ends = specimen.patch(place[k])
-        lift = specimen.rise(force[k], ends[1] - ends[0], 1 - force[k] / peak[k], decades(hold[k]))
+        lift = specimen.rise(force[k], ends[1] - ends[0], 1 - force[k] / peak[k], float(np.log10(max(hold[k], 0.1))))
         rest[k] = line.impedance(0.0, (0.0, 0.0), *(drift[k, 0] * scale))
         under[k] = line.impedance(lift, ends, *(drift[k, 1] * scale))
     noisy = [z * gain * (1 + NOISE * (rng.normal(size=z.shape) + 1j * rng.normal(size=z.shape))) for z in (rest, under)]

@@ -255,5 +255,5 @@ def test_without_pyarrow_parquet_is_refused_and_csv_is_not(full, tmp_path, monke
 
 def test_every_kind_has_every_column():
     for kind in ROWS:
-        assert exchange.kind_of(exchange.columns(kind)) is kind
-        assert {"number"} == {f.name for f in dataclasses.fields(kind)} - set(exchange.columns(kind))
+        assert exchange.kind_of(exchange.COLUMNS[kind]) is kind
+        assert {"number"} == {f.name for f in dataclasses.fields(kind)} - set(exchange.COLUMNS[kind])

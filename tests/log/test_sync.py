@@ -105,6 +105,17 @@ def test_the_same_table_imported_twice_is_one_table(machines, tmp_path):
     assert sound(a, b)
 
 
+def test_a_row_that_arrives_again_takes_no_number(machines, tmp_path):
+    a, b, _ = machines
+    for log in (a, b):
+        log.add([reading("23 triX", "650", uid="same")])
+    b.add([reading("23 triX", "660")])
+    for log in (b, a):
+        sync.sync(log, tmp_path / "share")
+    assert [(row.number, *row.y_ohm) for row in a.readings()] == [(1, 650), (2, 660)]
+    assert sound(a, b)
+
+
 def test_of_two_corrections_of_one_row_the_same_one_counts_everywhere_until_a_person_settles_it(machines, tmp_path):
     a, b, _ = machines
     (old,) = a.add([reading("23 triX", "0.65")])

@@ -43,8 +43,8 @@ def test_clocks_and_marks(run):
     counts = run.recording.counts()
     assert (counts["zero"], counts["transient"]) == (14, 23)
     middle = run.recording.time_s[-1] / 2
-    assert run.offset_s == pytest.approx(7.25 + 0.03 + 6e-5 * middle, abs=3 * run.offset_error_s)
-    assert run.skew == pytest.approx(6e-5 - 1.5e-4, abs=3 * run.skew_error)
+    assert run.clocks.offset_s == pytest.approx(7.25 + 0.03 + 6e-5 * middle, abs=3 * run.clocks.offset_error_s)
+    assert run.clocks.skew == pytest.approx(6e-5 - 1.5e-4, abs=3 * run.clocks.skew_error)
     assert 3 <= counts["rig error"] <= 400
 
 

@@ -33,10 +33,10 @@ def run():
 def test_the_offset_is_found_within_its_error(tmp_path, run, offset_s):
     log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(MADE, offset_s)))
     found = joined(recording(run), log)
-    assert found.offset_error_s < 0.01
-    assert found.offset_s == pytest.approx(offset_s + 0.03, abs=3 * found.offset_error_s)
-    assert found.skew == 0
-    assert f"{found.offset_s:.4f} +- " in found.clock_text()
+    assert found.clocks.offset_error_s < 0.01
+    assert found.clocks.offset_s == pytest.approx(offset_s + 0.03, abs=3 * found.clocks.offset_error_s)
+    assert found.clocks.skew == 0
+    assert f"{found.clocks.offset_s:.4f} +- " in found.clocks.words()
     truth, _ = made.force_at(run.time_s, MADE)
     told = np.isfinite(found.force_n)
     assert told.mean() > 0.99
@@ -54,10 +54,10 @@ def stamped(path):
 def test_stamps_of_one_computer_leave_little_to_find(tmp_path, run):
     late = made.write_rig(tmp_path / "late.csv", made.rig_rows(MADE, 0.2))
     found = joined(recording(run), stamped(late))
-    assert found.offset_s == pytest.approx(0.23, abs=3 * found.offset_error_s)
+    assert found.clocks.offset_s == pytest.approx(0.23, abs=3 * found.clocks.offset_error_s)
     off = joined(recording(run), stamped(made.write_rig(tmp_path / "off.csv", made.rig_rows(MADE, 32.0))))
-    assert off.offset_s == 0  # a response that fits 32 s later is no reason to believe that
-    assert np.isnan(off.offset_error_s)
+    assert off.clocks.offset_s == 0  # a response that fits 32 s later is no reason to believe that
+    assert np.isnan(off.clocks.offset_error_s)
 
 
 def test_errors_of_the_offset_are_what_they_say(tmp_path):
@@ -66,7 +66,7 @@ def test_errors_of_the_offset_are_what_they_say(tmp_path):
         one = made.run(MADE, seed=seed)
         log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(MADE, 1.0, seed=seed + 50)))
         found = joined(recording(one), log)
-        pulls.append((found.offset_s - 1.03) / found.offset_error_s)
+        pulls.append((found.clocks.offset_s - 1.03) / found.clocks.offset_error_s)
     assert 0.15 < np.sqrt(np.mean(np.square(pulls))) < 1.8
 
 
@@ -82,7 +82,7 @@ def test_lock_ins_share_the_clock_of_the_one_that_tells_it_best(tmp_path, run):
     )
     alone = joined(good, log)
     found = joined_all((deaf, short, dead, good), log)
-    assert {one.offset_s for one in found} == {alone.offset_s}
+    assert {one.clocks.offset_s for one in found} == {alone.clocks.offset_s}
     assert [one.recording.tones_hz.size for one in found] == [7, 2, 7, 7]
     for one in found:
         count = len(one.recording.time_s)
@@ -99,8 +99,8 @@ def test_a_skew_of_the_rigs_clock_is_found(tmp_path):
     run = made.run(many, rate_hz=70)
     log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(many, 2.0, skew=3e-4)))
     found = joined(recording(run, stamped=False), log)
-    assert found.skew == pytest.approx(3e-4, abs=3 * found.skew_error)
-    assert found.skew_error < 5e-5
+    assert found.clocks.skew == pytest.approx(3e-4, abs=3 * found.clocks.skew_error)
+    assert found.clocks.skew_error < 5e-5
 
 
 def test_errors_and_silence_of_the_rig_are_marked_and_counted(tmp_path, run):
@@ -127,9 +127,9 @@ def test_a_sensor_that_does_not_answer_leaves_the_clocks_as_they_are(tmp_path, r
     dead = made.Run(run.time_s, run.force_n, run.position_mm, z, z, z, run.presses)
     log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(MADE)))
     found = joined(recording(dead), log)
-    assert (found.offset_s, found.skew) == (0, 0)
-    assert np.isnan(found.offset_error_s)
-    assert "assumed to agree" in found.clock_text()
+    assert (found.clocks.offset_s, found.clocks.skew) == (0, 0)
+    assert np.isnan(found.clocks.offset_error_s)
+    assert "assumed to agree" in found.clocks.words()
 
     with pytest.raises(BadInput, match="too little to find the offset"):
         joined(recording(dead, stamped=False), log)
@@ -140,7 +140,7 @@ def test_clocks_that_both_count_from_0_and_clocks_far_apart(tmp_path, run):
     dead = replace(run, impedance_ohm=41 * np.exp(1e-3 * noise + 0j))
     shown, *others = made.rig_rows(MADE)
     same = rig(made.write_rig(tmp_path / "same.csv", [shown - made.EPOCH_S, *others]))
-    assert "assumed to agree" in joined(recording(dead, stamped=False), same).clock_text()  # both count from 0
+    assert "assumed to agree" in joined(recording(dead, stamped=False), same).clocks.words()  # both count from 0
     far = rig(made.write_rig(tmp_path / "far.csv", made.rig_rows(MADE, 9000.0)))
     with pytest.raises(BadInput, match="do not overlap within 1 s"):
         joined(recording(run), far, within_s=1.0)
@@ -199,4 +199,4 @@ def test_three_presses_in_noise_that_wanders_tell_the_offset(tmp_path):
     lived.impedance_ohm *= np.exp(1e-3 * lfilter([0.14], [1, -0.99], noise, axis=0))
     log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(MADE[:3], 3.217)))
     found = joined(recording(lived), log)
-    assert found.offset_s == pytest.approx(3.247, abs=0.02)
+    assert found.clocks.offset_s == pytest.approx(3.247, abs=0.02)

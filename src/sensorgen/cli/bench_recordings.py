@@ -19,10 +19,10 @@ from sensorgen.core.options import Option
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from sensorgen.core.arrays import Complex, Real
     from sensorgen.core.document import Documented
     from sensorgen.measure.readings import FileRows, Readings
     from sensorgen.measure.recording import Recording, RigLog
-    from sensorgen.measure.recording.samples import Complex, Real
     from sensorgen.measure.signal.presses import Pairs
     from sensorgen.measure.signal.run import Processed
 

@@ -10,7 +10,7 @@ import math
 import re
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
 from sensorgen.core.units import si
 from sensorgen.measure import csv_table
+from sensorgen.measure.csv_table import CsvTable
 from sensorgen.prediction.array.elements import ArraySession
 from sensorgen.prediction.array.frames import at_rest, missing
 from sensorgen.prediction.array.model import ArrayModel
@@ -33,9 +34,9 @@ _TRUE = ("1", "1.0", "true")
 KEYS = ("siemens", "capacitance_f")
 REFERENCES = ("pressure_kpa", "force_n", "element", "day", "area_mm2")
 _KNOWN = (*KEYS, "reading", "time_s", "rest", "frequency_hz", *REFERENCES)
-_BESIDE = ("time_s", "frequency_hz", "day")
-_HDF = (".h5", ".hdf5", ".hdf")
-BINARY = (".npz", *_HDF)
+_BESIDE = ("time_s", "frequency_hz", "day", "rest")
+HDF = (".h5", ".hdf5", ".hdf")
+BINARY = (".npz", *HDF)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,11 +102,9 @@ def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Fram
         if path.suffix not in BINARY:
             return _joined(list(lots(str(path), shape, frequency_hz)))
         found, unused = numbers(path)
-    try:
+    with within(str(path)):
         _refuse_times(unused)
         return replace(_checked(found, shape, frequency_hz), unused=tuple(unused))
-    except BadInput as error:
-        raise error.within(str(path)) from None
 
 
 def _checked(found: dict[str, np.ndarray], shape: tuple[int, int], frequency_hz: float | None) -> Frames:
@@ -124,8 +123,7 @@ def _checked(found: dict[str, np.ndarray], shape: tuple[int, int], frequency_hz:
     true = found.get("pressure_kpa", np.zeros(0))
     return Frames(
         values.astype(complex), rising(_each(found, "time_s", np.full(count, np.nan)).astype(float)),
-        np.nan_to_num(_each(found, "rest", np.zeros(count)).astype(float)) != 0, hertz,
-        true if true.shape == values.shape else None, day=float(np.ravel(found.get("day", np.nan))[0]),
+        _rest(found, count), hertz, true if true.shape == values.shape else None, day=_one(found, "day", math.nan),
     )  # fmt: skip
 
 
@@ -156,17 +154,29 @@ def _frequency(found: dict[str, np.ndarray], given: float | None) -> float:
     return hertz
 
 
-def _each(found: dict[str, np.ndarray], name: str, default: Real) -> Real:
+def _each(found: Mapping[str, np.ndarray], name: str, default: Real) -> Real:
     """One value for each frame."""
-    values = found.get(name, default)
-    if values.shape != default.shape:
+    values = np.asarray(found.get(name, default))
+    if values.shape[:1] != default.shape or values.size != default.size:
         raise BadInput(f"{name} has {values.size} values; expected one for each of {default.size} frames")
-    return values
+    return values.reshape(default.shape)
+
+
+def _rest(found: Mapping[str, np.ndarray], count: int) -> Mask:
+    """Frames that are marked at rest."""
+    return np.asarray(np.nan_to_num(_each(found, "rest", np.zeros(count)).astype(float)) != 0)
+
+
+def _one(found: Mapping[str, np.ndarray], name: str, usual: float) -> float:
+    """A number of all frames: the first that is one."""
+    values = np.ravel(np.asarray(found.get(name, usual), float))
+    values = values[np.isfinite(values)]
+    return float(values[0]) if values.size else usual
 
 
 def numbers(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     """Numbers of an NPZ or HDF5 file by name, and the names that are not read."""
-    if path.suffix in _HDF:
+    if path.suffix in HDF:
         return _of_hdf(path)
     try:
         with np.load(path, allow_pickle=False) as data:
@@ -194,23 +204,31 @@ def _of_hdf(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
 def lots(path: str, shape: tuple[int, int], frequency_hz: float | None) -> Iterator[Frames]:
     """Frames of a table as they come, lot by lot; "-" is the standard input. Parameters and errors as :func:`read`."""
     with csv_table.opened(path) as table, within(table.name):
-        names = table.names
-        places = crossings(names, shape)
-        beside = [name for name in names if name in _BESIDE]
-        unused = tuple(sorted({*names} - {*places, *_BESIDE, "rest", ""}))
+        places = crossings(table.names, shape)
+        unused = tuple(sorted({*table.names} - {*places, *_BESIDE, ""}))
         _refuse_times(unused)
-        numbers = [names.index(name) for name in (*places, *beside)]
-        rest = [k for k, name in enumerate(names) if name == "rest"]
         last = np.empty(0)
-        for block in table.blocks(numbers, rest):
-            values = np.full((len(block.rows), *shape), np.nan)
-            values[:, *np.transpose(list(places.values()))] = block.numbers[:, : len(places)]
-            found = dict(zip(beside, block.numbers[:, len(places) :].T, strict=True)) | {"capacitance_f": values}
-            if rest:
-                found["rest"] = marked([word for (word,) in block.text])
-            lot = replace(_checked(found, shape, frequency_hz), unused=unused)
+        for columns in _columns(table, [*places], _BESIDE):
+            values = np.full((len(columns["reading"]), *shape), np.nan)
+            values[:, *np.transpose(list(places.values()))] = columns["reading"]
+            lot = replace(_checked({**columns, "capacitance_f": values}, shape, frequency_hz), unused=unused)
             last, frequency_hz = rising(np.append(last, lot.time_s))[-1:], lot.frequency_hz
             yield lot
+
+
+def _columns(table: CsvTable, names: Sequence[str], beside: Collection[str]) -> Iterator[dict[str, np.ndarray]]:
+    """Columns of a table, lot by lot: readings side by side, and those of other names that it has."""
+    text = [name for name in table.names if name in beside and name in _WORDS]
+    numbers = [name for name in table.names if name in beside and name not in _WORDS]
+    places = [table.names.index(name) for name in (*names, *numbers, *text)]
+    count = len(places) - len(text)
+    for block in table.blocks(places[:count], places[count:]):
+        words = zip(text, zip(*block.text, strict=True), strict=True)
+        yield {
+            "reading": block.numbers[:, : len(names)],
+            **dict(zip(numbers, block.numbers[:, len(names) :].T, strict=True)),
+            **{name: _WORDS[name](column) for name, column in words},
+        }
 
 
 def _joined(parts: Sequence[Frames]) -> Frames:
@@ -354,38 +372,24 @@ def _session(
 ) -> ArraySession:  # fmt: skip
     count = len(values)
     nothing = np.full(count, np.nan)
-
-    def each(key: str, otherwise: Real) -> Real:
-        found = np.asarray(data.get(key, otherwise))
-        if found.shape[:1] != (count,) or (found.size != count and key != "pressure_kpa"):
-            raise BadInput(f"{key} has {found.size} values; expected one for each of {count} frames")
-        return found if key == "pressure_kpa" else found.reshape(count)
-
     if "time_s" not in data:
         raise BadInput("no time_s; expected the seconds of each frame: tare, memory and drift are by time")
-    time_s = rising(each("time_s", nothing).astype(float))
+    time_s = rising(_each(data, "time_s", nothing).astype(float))
     area, day = (_one(data, key, usual) for key, usual in (("area_mm2", default[1]), ("day", default[0])))
     if not 0 < area < np.inf:
         raise BadInput(f"area_mm2 is {area:g}; expected the area of an element, above 0")
-    force, pressure = each("force_n", nothing).astype(float), each("pressure_kpa", nothing).astype(float)
+    force = _each(data, "force_n", nothing).astype(float)
+    pressure = np.asarray(data.get("pressure_kpa", nothing), float)
+    if pressure.shape[:1] != (count,) or pressure.size not in (count, values.size):
+        raise BadInput(f"pressure_kpa has {pressure.size} values; expected one for each frame, or for each element too")
     if "element" in data:
-        of = _numbers_of(each("element", nothing), names, values.shape[1])
+        of = _numbers_of(_each(data, "element", nothing), names, values.shape[1])
         known = np.where(np.isfinite(force), force / (area * _N_PER_KPA_MM2), pressure)
         free = np.where((of < 0) & (known == 0), 0.0, np.nan)  # a cover spreads a press: others are not known
         pressure = np.where(np.arange(values.shape[1]) == of[:, None], known[:, None], free[:, None])
         force = nothing
-    if pressure.size not in (count, values.size):
-        raise BadInput(f"pressure_kpa has {pressure.size} values; expected one for each frame, or for each element too")
-    pressure = np.broadcast_to(pressure.reshape(count, -1), values.shape)
-    rest = np.nan_to_num(each("rest", np.zeros(count)).astype(float)) != 0
-    return ArraySession(name, day, time_s, values, rest, np.array(pressure), force, area, tuple(names))
-
-
-def _one(data: Mapping[str, np.ndarray], key: str, usual: float) -> float:
-    """A number of the whole session: the first that is one."""
-    values = np.ravel(np.asarray(data.get(key, usual), float))
-    values = values[np.isfinite(values)]
-    return float(values[0]) if values.size else usual
+    pressure = np.array(np.broadcast_to(pressure.reshape(count, -1), values.shape))
+    return ArraySession(name, day, time_s, values, _rest(data, count), pressure, force, area, tuple(names))
 
 
 def _numbers_of(words: np.ndarray, names: Sequence[str], count: int) -> np.ndarray:
@@ -405,12 +409,5 @@ def _of_csv(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
         names = [name for name in table.names if name and name not in _OTHER]
         if not names:
             raise BadInput("no readings; expected a column for each element")
-        beside = [*({*table.names} & {*_OTHER} - {*_WORDS})]
-        text = [*({*table.names} & {*_WORDS})]
-        at = table.names.index
-        blocks = list(table.blocks([*map(at, names), *map(at, beside)], [*map(at, text)]))
-    values = np.concatenate([block.numbers for block in blocks])
-    data = {"reading": values[:, : len(names)], **dict(zip(beside, values[:, len(names) :].T, strict=True))}
-    for k, name in enumerate(text):
-        data[name] = _WORDS[name]([row[k] for block in blocks for row in block.text])
-    return data, names
+        parts = list(_columns(table, names, _OTHER))
+    return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}, names

@@ -8,14 +8,13 @@ fails, cells are converted one by one, so that the message can name the cell.
 import codecs
 import csv
 import sys
-from collections import deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import islice
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,13 +29,6 @@ _MOST_LINES = 200  # of one row, whose cells may have line feeds
 SAME_NAMES: Mapping[str, str] = {}
 
 
-class TextLines(Protocol):
-    """Part of a text stream that a table needs."""
-
-    def readline(self, limit: int, /) -> str:
-        """The next line with its line feed, at most so many characters of it; empty at the end."""
-
-
 class Waiting:
     """Lines of a binary stream that knows how many have come already.
 
@@ -47,30 +39,22 @@ class Waiting:
     """
 
     def __init__(self, file: IO[bytes]) -> None:
-        self._file, self._lines, self._rest = file, deque[bytes](), b""
+        self._file, self._come, self._at = file, b"", 0
         self._begun = False
 
-    def __len__(self) -> int:
-        """Whole lines that have come."""
-        return len(self._lines)
+    def __bool__(self) -> bool:
+        """True if a whole line has come."""
+        return self._come.find(b"\n", self._at) >= 0
 
     def readline(self, limit: int, /) -> str:
-        """The next line, as :meth:`Lines.readline`."""
-        while not self._lines and len(self._rest) < limit:
-            more = self._file.read1(1 << 16)  # type: ignore[attr-defined]
-            if not more:
-                break
-            *whole, self._rest = (self._rest + more).split(b"\n")
-            self._lines.extend(line + b"\n" for line in whole)
-        if self._lines:
-            line = self._lines.popleft()
-            if len(line) > limit:
-                self._lines.appendleft(line[limit:])
-        else:
-            line, self._rest = self._rest[:limit], self._rest[limit:]
+        """The next line with its line feed, at most so many bytes of it; empty at the end."""
+        while not self and len(self._come) - self._at < limit and (more := self._file.read1(1 << 16)):  # type: ignore[attr-defined]
+            self._come, self._at = self._come[self._at :] + more, 0
+        end = self._come.find(b"\n", self._at, self._at + limit) + 1 or self._at + limit
+        line, self._at = self._come[self._at : end], min(end, len(self._come))
         if not self._begun:
             line, self._begun = line.removeprefix(codecs.BOM_UTF8), True
-        return line[:limit].decode(errors="surrogateescape")
+        return line.decode(errors="surrogateescape")
 
 
 @dataclass(frozen=True)
@@ -112,7 +96,7 @@ class CsvTable:
         Whether an incomplete last row was dropped.
     """
 
-    def __init__(self, name: str, file: TextLines, columns: Mapping[str, str] = SAME_NAMES) -> None:
+    def __init__(self, name: str, file: IO[str] | Waiting, columns: Mapping[str, str] = SAME_NAMES) -> None:
         self.name, self.truncated = name, False
         self._file, self._row = file, 0
         header = self._line()
@@ -157,10 +141,9 @@ class CsvTable:
             if truncated and not last.endswith("\n") and last.count(self._separator) < len(self.names) - 1:
                 self.truncated = True
                 batch.pop()
-            filled = [(row, line) for row, line in batch if not line.isspace()]
-            if filled:
+            if filled := [(row, line) for row, line in batch if not line.isspace()]:
                 empty = False
-                yield self._block([row for row, _ in filled], [line for _, line in filled], numbers, text, dates)
+                yield self._block(filled, numbers, text, dates)
         if empty:
             raise BadInput(f"{self.name}: no rows below the header")
 
@@ -170,7 +153,7 @@ class CsvTable:
         for line in islice(iter(self._line, ""), size):
             yield self._row, line
             characters += len(line)
-            if characters > _BLOCK_CHARACTERS or (isinstance(self._file, Waiting) and not len(self._file)):
+            if characters > _BLOCK_CHARACTERS or (isinstance(self._file, Waiting) and not self._file):
                 return
 
     def _line(self) -> str:
@@ -189,10 +172,10 @@ class CsvTable:
         return line
 
     def _block(
-        self, rows: list[int], lines: list[str], numbers: Sequence[int], text: Sequence[int], dates: Collection[int]
+        self, batch: Sequence[tuple[int, str]], numbers: Sequence[int], text: Sequence[int], dates: Collection[int]
     ) -> TableRows:
-        simple = all(line.count(self._separator) == len(self.names) - 1 and '"' not in line for line in lines)
-        values = self._converted_at_once(lines, numbers) if simple else None
+        rows, lines = map(list, zip(*batch, strict=True))
+        values = self._converted_at_once(lines, numbers)
         if values is not None:  # no quotes: every separator separates, and splitting is faster
             cells = [line.rstrip("\r\n").split(self._separator) if text else [] for line in lines]
         else:
@@ -208,7 +191,9 @@ class CsvTable:
             raise error.within(f"{self.name}, row {row}, column {self.names[at]}") from None
 
     def _converted_at_once(self, lines: list[str], numbers: Sequence[int]) -> NDArray[np.float64] | None:
-        """All numbers of a block, or None where a cell is empty, no number, or infinite."""
+        """All numbers of a block, or None where a cell is quoted, empty, no number, or infinite."""
+        if any('"' in line or line.count(self._separator) != len(self.names) - 1 for line in lines):
+            return None
         if self._separator == ";":
             lines = [line.replace(",", ".") for line in lines]
         try:

@@ -130,49 +130,36 @@ def factor(quantity: str, unit: str) -> Decimal:
     (Decimal('1E-12'), Decimal('1000'), Decimal('0.01'), Decimal('1'), Decimal('1000'))
     """
     wanted = UNITS.get(quantity, "Hz")
-    if not unit or unit == wanted:
-        return Decimal(1)
-    for length in range(len(unit)):  # the prefix is what stands before the unit
+    for length in range(len(unit) + 1):  # the prefix is what stands before the unit, or alone, as in 12.3p
         base = unit[length:]
         base = base if base == wanted else _SPELLINGS.get(base, _SPELLINGS.get(base.casefold(), base.casefold()))
         prefix = _PREFIX.get(unit[:length])
-        if prefix is not None and base == wanted:
+        if prefix is not None and base in (wanted, ""):
             return prefix
         if length == 0 and (wanted, base) in _SCALES:
             return _SCALES[wanted, base]
-    if unit in _PREFIX:  # 12.3p
-        return _PREFIX[unit]
     raise BadInput(f"unit {unit!r:.20}; expected {wanted or 'none, or %'}{' or deg' * (wanted == 'rad')}")
 
 
-_Closed = Callable[[float, float, float], complex]
+_PARALLEL = ("G", "Y", "Cp", "Lp")  # parts of an admittance; R, Z, Cs and Ls are of an impedance
+_PAIRS = (
+    ("R", "X"), ("Z", "phase"), ("G", "B"), ("Y", "phase"),
+    *((one, other) for one in ("Cp", "Cs", "Lp", "Ls")
+      for other in ("D", "Q", *(("G", "Rp") if one in _PARALLEL else ("R",)))),
+)  # fmt: skip
 
 
-def _loss(x: float, d: float) -> complex:
-    """Of a reactance, or a susceptance, and D."""
-    return complex(abs(x) * d, x)
-
-
-_PAIRS: dict[tuple[str, str], _Closed] = {  # two values and the angular frequency to Z
-    ("R", "X"): lambda r, x, _w: complex(r, x),
-    ("Z", "phase"): lambda z, angle, _w: cmath.rect(z, angle),
-    ("G", "B"): lambda g, b, _w: 1 / complex(g, b),
-    ("Y", "phase"): lambda y, angle, _w: 1 / cmath.rect(y, angle),
-    ("Cp", "D"): lambda c, d, w: 1 / _loss(w * c, d),
-    ("Cp", "Q"): lambda c, q, w: 1 / _loss(w * c, 1 / q),
-    ("Cp", "G"): lambda c, g, w: 1 / complex(g, w * c),
-    ("Cp", "Rp"): lambda c, r, w: 1 / complex(1 / r, w * c),
-    ("Cs", "D"): lambda c, d, w: _loss(-1 / (w * c), d),
-    ("Cs", "Q"): lambda c, q, w: _loss(-1 / (w * c), 1 / q),
-    ("Cs", "R"): lambda c, r, w: complex(r, -1 / (w * c)),
-    ("Lp", "D"): lambda h, d, w: 1 / _loss(-1 / (w * h), d),
-    ("Lp", "Q"): lambda h, q, w: 1 / _loss(-1 / (w * h), 1 / q),
-    ("Lp", "G"): lambda h, g, w: 1 / complex(g, -1 / (w * h)),
-    ("Lp", "Rp"): lambda h, r, w: 1 / complex(1 / r, -1 / (w * h)),
-    ("Ls", "D"): lambda h, d, w: _loss(w * h, d),
-    ("Ls", "Q"): lambda h, q, w: _loss(w * h, 1 / q),
-    ("Ls", "R"): lambda h, r, w: complex(r, w * h),
-}
+def _of_pair(pair: tuple[str, str], one: float, other: float, omega: float) -> complex:
+    """Impedance of two values [ohm]; ZeroDivisionError where it is infinite, or of no finite one."""
+    if pair[1] == "phase":
+        z = cmath.rect(one, other)
+    elif pair[0] in ("R", "G"):
+        z = complex(one, other)
+    else:
+        imaginary = omega * one if pair[0] in ("Cp", "Ls") else -1 / (omega * one)
+        real = 1 / other if pair[1] in ("Q", "Rp") else other
+        z = complex(abs(imaginary) * real if pair[1] in ("D", "Q") else real, imaginary)
+    return 1 / z if pair[0] in _PARALLEL else z
 
 
 def impedance(values: Mapping[str, float], frequency_hz: float) -> complex | None:
@@ -199,9 +186,8 @@ def impedance(values: Mapping[str, float], frequency_hz: float) -> complex | Non
     both = pair(values)
     if both is None:
         return None
-    one, other = both
     try:
-        z = _PAIRS[both](values[one], values[other], 2 * math.pi * frequency_hz)
+        z = _of_pair(both, values[both[0]], values[both[1]], 2 * math.pi * frequency_hz)
     except (ZeroDivisionError, OverflowError):
         return None
     return z if cmath.isfinite(z) else None

@@ -8,10 +8,10 @@ import csv
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, within
 from sensorgen.measure import immittance
 from sensorgen.measure.csv_table import miscounted
 from sensorgen.measure.immittance import AcReading
@@ -82,8 +82,13 @@ class _Column:
     scale: float | None
     head: str
 
+    def scale_of(self, unit: str) -> float | None:
+        """Factor to SI of a number with a unit of its own; the column's without one."""
+        return float(immittance.factor(self.quantity, unit)) if unit else self.scale
 
-_Row = dict[_Column, tuple[float, bool]]
+
+_Number = tuple[float, bool]  # in SI units, and True if its unit is known
+_Row = dict[_Column, _Number]
 
 
 @dataclass(frozen=True)
@@ -120,7 +125,7 @@ def read(path: Path) -> LcrTable:
         if any(cells[k].strip("+0. ") for k in header.status):
             faulty += 1
         else:
-            rows.append(_values(cells, columns, path, number))
+            rows.append(dict(_numbers(cells, columns, f"{path}, row {number + 1}")))
     overloads = len(rows) * len(columns) - sum(map(len, rows))
     readings = tuple(_readings(rows, columns, path))
     if not readings:
@@ -154,7 +159,7 @@ def _rows(lines: Sequence[str], header: _Header, first: int, path: Path) -> Iter
     """Number and cells of each row of the table."""
     for number in range(first, len(lines)):
         cells = _cells(lines[number], header.separator)
-        if not any(cells) or lines[number].lstrip().startswith(_COMMENTS):
+        if not any(cells) or _is_remark(lines[number]):
             continue
         if wrong := miscounted(cells, len(header.heads), header.separator):
             raise BadInput(f"{path}, row {number + 1}: {wrong}")
@@ -245,55 +250,47 @@ def _name(head: str) -> tuple[str, str]:
 def _with_units(lines: Sequence[str], header: _Header) -> tuple[tuple[_Column, ...], int]:
     """Columns with the units of a row below the header, if there is one, and the first row of numbers."""
     below = header.line + 1
-    while below < len(lines) and (not lines[below].strip() or lines[below].lstrip().startswith(_COMMENTS)):
+    while below < len(lines) and _is_remark(lines[below]):
         below += 1
     cells = _cells(lines[below], header.separator) if below < len(lines) else []
-    if not any(cells) or any(_NUMBER.match(cell) for cell in cells) or len(cells) > len(header.heads):
+    if not any(cells) or any(map(_NUMBER.match, cells)) or len(cells) > len(header.heads):
         return header.columns, below
-    return tuple(_with_unit(column, cells) for column in header.columns), below + 1
+    units = [cell.strip("[]() -") for cell in cells] + [""] * len(header.heads)
+    return tuple(replace(column, scale=column.scale_of(units[column.at])) for column in header.columns), below + 1
 
 
-def _with_unit(column: _Column, cells: Sequence[str]) -> _Column:
-    """A column in the unit that its cell of the row of units states, if it does."""
-    unit = cells[column.at].strip("[]() -") if column.at < len(cells) else ""
-    scale = float(immittance.factor(column.quantity, unit)) if unit else column.scale
-    return _Column(column.at, column.quantity, scale, column.head)
+def _is_remark(line: str) -> bool:
+    """Test whether a line is blank, or a comment."""
+    return not line.strip() or line.lstrip().startswith(_COMMENTS)
 
 
-def _values(cells: Sequence[str], columns: Sequence[_Column], path: Path, number: int) -> _Row:
+def _numbers(cells: Sequence[str], columns: Sequence[_Column], where: str) -> Iterator[tuple[_Column, _Number]]:
     """Numbers of a row, without those that are missing."""
-    values = ((column, _value(cells[column.at], column, path, number)) for column in columns)
-    return {column: value for column, value in values if value}
-
-
-def _value(cell: str, column: _Column, path: Path, number: int) -> tuple[float, bool] | None:
-    """Number in SI units, and whether its unit is known; None where there is none."""
-    where = f"{path}, row {number + 1}, column {column.head}"
-    if _MISSING.fullmatch(cell):
-        return None
-    match = _NUMBER.fullmatch(cell)
-    if match is None:
-        raise BadInput(f"{where}: {cell!r:.40} is no number; leave the cell empty where nothing was measured")
-    value = float(immittance.decimal(match["number"]))
-    if abs(value) >= OVERLOAD:
-        return None
-    try:
-        scale = float(immittance.factor(column.quantity, match["unit"])) if match["unit"] else column.scale
-    except BadInput as error:
-        raise error.within(where) from None
-    return value * (1.0 if scale is None else scale), scale is not None
+    for column in columns:
+        cell = cells[column.at]
+        if _MISSING.fullmatch(cell):
+            continue
+        match = _NUMBER.fullmatch(cell)
+        if match is None:
+            message = f"{cell!r:.40} is no number; leave the cell empty where nothing was measured"
+            raise BadInput(f"{where}, column {column.head}: {message}")
+        value = float(immittance.decimal(match["number"]))
+        if abs(value) < OVERLOAD:
+            with within(f"{where}, column {column.head}"):
+                scale = column.scale_of(match["unit"])
+            yield column, (value * (1.0 if scale is None else scale), scale is not None)
 
 
 def _readings(rows: Sequence[_Row], columns: Sequence[_Column], path: Path) -> Iterator[AcReading]:
     degrees = _degrees(rows, columns, path)
-    at = next(column for column in columns if column.quantity == "frequency")
-    for row in (row for row in rows if at in row):
-        frequency, _ = row.pop(at)
+    at = {column.quantity: column for column in columns}["frequency"]
+    for row in rows:
+        frequency, _ = row.pop(at, (math.nan, False))
         if frequency < 0 or (frequency == 0 and row):
             raise BadInput(f"{path}: a frequency of {frequency:g} Hz; expected one above 0")
-        for column, (value, known) in row.items():
-            bare = column.quantity == "phase" and not known
-            yield AcReading(column.quantity, math.radians(value) if bare and degrees else value, frequency)
+        for column, (value, known) in row.items() if frequency > 0 else ():
+            angle = degrees and column.quantity == "phase" and not known
+            yield AcReading(column.quantity, math.radians(value) if angle else value, frequency)
 
 
 def _degrees(rows: Sequence[_Row], columns: Sequence[_Column], path: Path) -> bool:

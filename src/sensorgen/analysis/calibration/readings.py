@@ -95,8 +95,8 @@ def _runs(log: Log, row: BenchRun, left_out: list[str]) -> Iterator[_Run]:
             result = processed(recording, with_rig, remove_drift=False)
             left_out += [f"recording {row.number}: {note}" for note in (result.pairs.left_out if result.pairs else ())]
             pairs = result.pairs if result.by_force else None
-            if with_rig is not None and np.isnan(with_rig.offset_error_s):
-                left_out.append(f"recording {row.number}: {with_rig.clock_text()}")
+            if with_rig is not None and np.isnan(with_rig.clocks.offset_error_s):
+                left_out.append(f"recording {row.number}: {with_rig.clocks.words()}")
                 pairs = pairs if np.isfinite(recording.epoch_s) else None
             yield _Run(recording.tones_hz, pairs, *_rest(result.recording, result.pairs))
 

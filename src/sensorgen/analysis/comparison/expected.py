@@ -11,6 +11,7 @@ from statistics import fmean, geometric_mean
 
 import numpy as np
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.core.version import __version__
@@ -18,7 +19,6 @@ from sensorgen.design.body import Body
 from sensorgen.design.design import make
 from sensorgen.measure.log import Entry, Log, Withdrawal
 from sensorgen.measure.log import Prediction as Stored
-from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.measure.signal.verdicts import along_ohm, leak_s
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import bodies

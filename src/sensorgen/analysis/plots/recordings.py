@@ -25,8 +25,8 @@ from sensorgen.analysis.plots.figure import (
     thinned,
 )
 from sensorgen.analysis.plots.pages import PageSection, page
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.measure.signal.presses import Pairs, Surface, normalised, surface
 from sensorgen.measure.signal.run import Hysteresis
 from sensorgen.measure.signal.schedule import Step

@@ -18,10 +18,10 @@ from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.comparison.expected import Movable, at_rest, moved, pressed
 from sensorgen.analysis.comparison.measured import RecordedRun
 from sensorgen.analysis.report.electrodes import usable
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
-from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.measure.signal.verdicts import INTACT_OHM, across_ohm
 
 RESISTIVITY, PERMITTIVITY, MODULUS, FILM, LEAK = PARAMETERS = (

@@ -120,16 +120,12 @@ class Instrument:
         float or None
             In the quantity's unit; None beyond the frequencies or impedances of the specification.
         """
-        share = self._share(frequency_hz, abs(z_ohm))
-        if share is None:
-            return None
-        return uncertainty(share / math.sqrt(3), quantity, value, z_ohm)
-
-    def _share(self, frequency_hz: float, z_ohm: float) -> float | None:
+        size = abs(z_ohm)
         band = next((one for one in self.bands if one.from_hz <= frequency_hz <= one.to_hz), None)
-        if band is None or not self.least_ohm <= z_ohm <= self.most_ohm:
+        if band is None or not self.least_ohm <= size <= self.most_ohm:
             return None
-        return band.share + band.short_ohm / z_ohm + z_ohm * band.open_s
+        share = band.share + band.short_ohm / size + size * band.open_s
+        return uncertainty(share / math.sqrt(3), quantity, value, z_ohm)
 
 
 def uncertainty(share: float, quantity: str, value: float, z_ohm: complex) -> float:
@@ -202,7 +198,7 @@ class At:
         """Mean, and its uncertainty: scatter of the repeats (type A) and the meter's limit, or what was stated."""
         z = self.z_ohm
         these = self.values.get(quantity) or [
-            float(quantity_of(quantity, each, self.frequency_hz)) for each in self.impedances if each
+            float(quantity_of(quantity, each, self.frequency_hz)) for each in self.impedances
         ]
         if not these:
             return MeasuredValue(math.nan)
@@ -223,7 +219,7 @@ def at_frequency(reading: Reading, frequency_hz: float) -> At:
             values.setdefault(name, []).append(value)
             stated[name] = max(error, stated.get(name, 0.0))
     repeats = [dict(zip(values, some, strict=True)) for some in zip(*values.values(), strict=False)]
-    known = tuple(z for one in repeats if (z := impedance(one, frequency_hz)) is not None)
+    known = tuple(z for one in repeats if (z := impedance(one, frequency_hz)))
     meter = find(reading.instrument) if reading.instrument else None
     return At(meter, frequency_hz, values, known, stated)
 
@@ -262,18 +258,8 @@ def _instrument(data: dict[str, Any]) -> Instrument:
     return Instrument(data["name"], tuple(data.get("also", ())), data["source"], ranges, bands=bands, **plain)
 
 
-def names() -> Sequence[str]:
-    """Instruments whose accuracy is known."""
-    return tuple(_all())
-
-
-def is_named(name: str, text: str) -> bool:
-    """Test whether a text names an instrument, by its type: as a label, or a reply to ``*IDN?``."""
-    return is_of(_all()[name], text)
-
-
 def is_of(one: Instrument, text: str) -> bool:
-    """Test whether a text names this instrument; as :func:`is_named`."""
+    """Test whether a text names this instrument, by its type: as a label, or a reply to ``*IDN?``."""
     types = (one.name.split()[-1], *one.also)
     return any(re.search(rf"(?<![0-9A-Za-z]){re.escape(each)}(?![0-9])", text, re.IGNORECASE) for each in types)
 
@@ -284,4 +270,4 @@ def find(text: str) -> Instrument | None:
     >>> find("HEWLETT-PACKARD,34401A,0,7-5-2").name, find("an old meter")
     ('HP 34401A', None)
     """
-    return next((one for name, one in _all().items() if is_named(name, text)), None)
+    return next((one for one in _all().values() if is_of(one, text)), None)

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from sensorgen.core.errors import BadInput, NotInstalled, UnknownName
+from sensorgen.core.errors import BadInput, NotInstalled, UnknownName, within
 from sensorgen.core.records import Line, Strict, checked
 from sensorgen.measure.lab.devices import PYMEASURE, Actuator, Clock, FrameMeter, ImpedanceMeter, Meter, Role, Stage
 from sensorgen.measure.virtual.plant import Plant
@@ -90,16 +90,21 @@ def listed() -> dict[str, str]:
     """Every kind with its role, those of PyMeasure included, or how to get them."""
     from sensorgen.measure.lab import pymeasure_meters
 
-    roles = dict[str, str]()
+    try:
+        return roles() | {name: role for name, (role, _) in pymeasure_meters.roles().items()}
+    except NotInstalled as error:
+        return roles() | {f"{PYMEASURE}CLASS": str(error)}
+
+
+def roles() -> dict[str, str]:
+    """Every kind with its role, or why it cannot be used, without those of PyMeasure."""
+    by_name = dict[str, str]()
     for name in names():
         try:
-            roles[name] = kind(name).role
+            by_name[name] = kind(name).role
         except BadInput as error:
-            roles[name] = f"cannot be used: {error}"
-    try:
-        return roles | {name: role for name, (role, _) in pymeasure_meters.roles().items()}
-    except NotInstalled as error:
-        return roles | {f"{PYMEASURE}CLASS": str(error)}
+            by_name[name] = f"cannot be used: {error}"
+    return by_name
 
 
 def kind(name: str) -> Kind:
@@ -115,7 +120,10 @@ def kind(name: str) -> Kind:
     if name in _KINDS:
         return _KINDS[name]()
     if name.startswith(PYMEASURE):
-        return _pymeasure(name)
+        from sensorgen.measure.lab import pymeasure_meters
+
+        role, driver = pymeasure_meters.meter(name)
+        return Kind(role, pymeasure_meters.Settings, driver)
     point = _installed().get(name)
     if point is None:
         raise UnknownName("kind of device", name, names())
@@ -170,10 +178,8 @@ def simulated(name: str, plant: Plant, settings: Mapping[str, Any], clock: Clock
 
 
 def _settings(of: Kind, name: str, settings: Mapping[str, Any]) -> Strict:
-    try:
+    with within(f"settings of {name}"):
         return checked(of.settings, settings)
-    except BadInput as error:
-        raise BadInput(f"settings of {name}: {error}") from None
 
 
 def _installed() -> dict[str, Any]:
@@ -240,7 +246,7 @@ def _handyscope() -> Kind:
     from sensorgen.measure.virtual.handyscope import Analyser, PhasorMeter
 
     def simulate(plant: Plant, given: HandyscopeSettings, clock: Clock) -> Simulated:
-        far_end = PhasorMeter(plant, clock, Analyser(given.feedback_ohm, given.feedback_f), range_v=given.range_v)
+        far_end = PhasorMeter(plant, clock, Analyser(given.feedback_ohm, given.feedback_f, given.range_v))
         return Simulated(far_end, far_end)
 
     def real(address: str, given: HandyscopeSettings, clock: Clock) -> Device:
@@ -278,13 +284,6 @@ def _frames() -> Kind:
         return frame_stream.FrameStream(port.SerialPort(address, given.baud), clock)
 
     return Kind("array", frame_stream.StreamSettings, real)
-
-
-def _pymeasure(name: str) -> Kind:
-    from sensorgen.measure.lab import pymeasure_meters
-
-    role, driver = pymeasure_meters.meter(name)
-    return Kind(role, pymeasure_meters.Settings, driver)
 
 
 _KINDS: dict[str, Callable[[], Kind]] = {

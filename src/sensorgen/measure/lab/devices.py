@@ -104,6 +104,10 @@ class Identity:
     serial: str = ""
     firmware: str = ""
 
+    def words(self) -> str:
+        """All that is known, for people."""
+        return " ".join(filter(None, (self.model, self.serial, self.firmware)))
+
 
 @dataclass(frozen=True)
 class Extension:
@@ -232,14 +236,10 @@ class Readings:
     @classmethod
     def joined(cls, parts: "Sequence[Readings]", tones: int, lost: int = 0) -> "Readings":
         """Several as one, or none, at a number of frequencies; ``lost`` beside those of the parts."""
-        times, clipped = [np.empty(0)], [np.empty(0, bool)]
-        impedance = [np.empty((0, tones), complex)]
-        for part in parts:
-            times.append(part.time_s)
-            impedance.append(part.impedance_ohm)
-            clipped.append(part.clipped)
-            lost += part.lost
-        return cls(np.concatenate(times), np.concatenate(impedance), np.concatenate(clipped), lost)
+        nothing = cls(np.empty(0), np.empty((0, tones), complex), np.empty(0, bool))
+        columns = ("time_s", "impedance_ohm", "clipped")
+        times, z, clipped = (np.concatenate([getattr(part, name) for part in (nothing, *parts)]) for name in columns)
+        return cls(times, z, clipped, lost + sum(part.lost for part in parts))
 
     @classmethod
     def of_tone(cls, time_s: float, k: int, tones: int, value_ohm: complex | None, *, clipped: bool) -> "Readings":

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from sensorgen.core import yamlfile
 from sensorgen.core.arrays import Complex, Real
@@ -24,6 +24,15 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
 Span = Annotated[tuple[Number, Number], Field(strict=False)]
+
+
+def _rising(span: tuple[float, float]) -> tuple[float, float]:
+    if not 0 < span[0] <= span[1]:
+        raise ValueError(f"{span[0]:g}, {span[1]:g}; expected numbers above 0 that rise")
+    return span
+
+
+Rising = Annotated[Span, AfterValidator(_rising)]
 Frequencies = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1, max_length=100)]
 Name = Annotated[Line, Field(min_length=1, max_length=100)]
 
@@ -135,14 +144,23 @@ class Approach(Strict):
     rate_n_s: Positive = 20.0
     place_mm: Number | None = None
 
+    def course(self, *stops: tuple[float, float]) -> tuple[tuple[float, float], ...]:
+        """Course of the force from the contact on: to each force, where it stays for a time [N], [s]."""
+        course = [(0.0, self.contact_n)]
+        for force_n, stay_s in stops:
+            time_s, at_n = course[-1]
+            there_s = time_s + abs(force_n - at_n) / self.rate_n_s
+            course += [(there_s, force_n), (there_s + stay_s, force_n)]
+        return tuple(course)
+
 
 class Free(Strict):
     """Presses whose force, place and hold are not given."""
 
     presses: Count
-    force_n: Span = (0.4, 6.0)
-    position_mm: Span | None = None
-    hold_s: Span = (0.3, 30.0)
+    force_n: Rising = (0.4, 6.0)
+    position_mm: Rising | None = None
+    hold_s: Rising = (0.3, 30.0)
     rest_s: Positive = 4.0
 
 
@@ -379,9 +397,7 @@ def _largest_n(key: str, part: Kind) -> tuple[float, str]:
         if part.amplitude_n >= part.mean_n:
             raise OutOfRange(f"{key}.amplitude_n: {part.amplitude_n:g} N lifts the tip; expected less than mean_n")
         return part.mean_n + part.amplitude_n, "mean_n + amplitude_n"
-    forces = part.force_n if isinstance(part.force_n, tuple) else (part.force_n,)
-    _rising(f"{key}.force_n", forces)
-    return max(forces), "force_n"
+    return float(np.max(part.force_n)), "force_n"
 
 
 def _check_part(key: str, part: Kind, limit_n: float, places_mm: tuple[float, float]) -> None:
@@ -391,13 +407,8 @@ def _check_part(key: str, part: Kind, limit_n: float, places_mm: tuple[float, fl
             f"{key}.{name}: {largest:g} N; expected up to {_ROOM * limit_n:.4g} N, {_ROOM:.0%} of limits.force_n, "
             "above which the tip is lifted"
         )
-    if isinstance(part, Free):
-        _rising(f"{key}.hold_s", part.hold_s)
-    where = part.position_mm
-    for place in () if where is None else where if isinstance(where, tuple) else (where,):
+    for place in () if part.position_mm is None else np.ravel(part.position_mm).tolist():
         _inside(f"{key}.position_mm", place, places_mm)
-    if isinstance(where, tuple) and not isinstance(part, ForceSweep):
-        _rising(f"{key}.position_mm", where)
 
 
 def check_press(experiment: Experiment, force_n: float, place_mm: float, length_mm: float) -> None:
@@ -405,11 +416,6 @@ def check_press(experiment: Experiment, force_n: float, place_mm: float, length_
     if not 0 < force_n <= _ROOM * experiment.limits.force_n:
         raise OutOfRange(f"next press: {force_n:g} N; expected up to {_ROOM * experiment.limits.force_n:.4g} N")
     _inside("next press", place_mm, experiment.places_mm(length_mm))
-
-
-def _rising(key: str, span: tuple[float, ...]) -> None:
-    if span[0] <= 0 or span[0] > span[-1]:
-        raise OutOfRange(f"{key}: {', '.join(f'{value:g}' for value in span)}; expected numbers above 0 that rise")
 
 
 def _inside(key: str, place_mm: float, allowed_mm: tuple[float, float]) -> None:
@@ -430,12 +436,6 @@ class PlannedPress:
 
     Attributes
     ----------
-    number : int
-        In the plan, from 1.
-    part : int
-        Part of the plan, from 0.
-    kind : str
-        Of the part.
     place_mm : float
         Of the tip's centre [mm]; nan where it is chosen during the run.
     course : tuple of (float, float)
@@ -446,18 +446,24 @@ class PlannedPress:
         Force at which it is read, largest force before, and time at the force before the average [N], [s].
     wave : (float, float)
         Amplitude and frequency of what is added to the last piece of the course [N], [Hz].
+    number : int
+        In the plan, from 1.
+    part : int
+        Part of the plan, from 0.
+    kind : str
+        Of the part.
     """
 
-    number: int
-    part: int
-    kind: str
     place_mm: float
     course: tuple[tuple[float, float], ...]
     rest_s: float
     force_n: float
     peak_n: float
-    hold_s: float
+    hold_s: float = 0.0
     wave: tuple[float, float] = (0.0, 0.0)
+    number: int = 0
+    part: int = 0
+    kind: str = ""
 
     @property
     def seconds(self) -> float:
@@ -512,6 +518,13 @@ class Choice:
     hold_s: float = 1.0
     interval: float = inf
 
+    def press(self, approach: Approach, rest_s: float) -> PlannedPress:
+        """Up to the force, over a higher one if there is one, hold, and average."""
+        peak = ((self.peak_n, _AT_PEAK_S),) if self.peak_n > self.force_n else ()
+        course = approach.course(*peak, (self.force_n, self.hold_s + AVERAGED_S))
+        most = max(self.peak_n, self.force_n)
+        return PlannedPress(self.position_mm, course, rest_s, self.force_n, most, self.hold_s)
+
 
 NextPress = Callable[[Next, Sequence[DonePress], Complex], Choice]
 """The best next press, by the part of the plan that asks, all presses so far, and the mean at rest (m,) [ohm]."""
@@ -535,36 +548,37 @@ def seconds(planned: Sequence[PlannedPress], longest_hold_s: float = 30.0) -> fl
 
 def chosen(step: PlannedPress, choice: Choice, approach: Approach) -> PlannedPress:
     """A step with what was chosen for it."""
-    press = _press(approach, choice.position_mm, choice.force_n, choice.peak_n, choice.hold_s, step.rest_s)
-    return replace(press, number=step.number, part=step.part, kind=step.kind)
+    return replace(choice.press(approach, step.rest_s), number=step.number, part=step.part, kind=step.kind)
 
 
-def _presses(
-    part: Random | Ramp | Hold | Sine | ForceSweep | Next, experiment: Experiment, places: tuple[float, float]
-) -> Iterator[PlannedPress]:
+def _presses(part: Kind, experiment: Experiment, places: tuple[float, float]) -> Iterator[PlannedPress]:
     approach = experiment.approach
     match part:
         case Random():
-            yield from _random(part, approach, part.position_mm or places)
+            for choice in _random(part, part.position_mm or places):
+                yield choice.press(approach, part.rest_s)
         case Ramp():
             low = min(approach.contact_n, part.force_n)
             took = (part.force_n - low) / part.rate_n_s
-            course = ((0.0, low), (took, part.force_n), (2 * took, low))
-            for _ in range(part.repeats):
-                yield _step(part.position_mm, course, part.rest_s, part.force_n)
+            ramp = ((0.0, low), (took, part.force_n), (2 * took, low))
+            yield from [PlannedPress(part.position_mm, ramp, part.rest_s, part.force_n, part.force_n)] * part.repeats
         case Hold():
-            yield _press(approach, part.position_mm, part.force_n, 0.0, part.hold_s, part.rest_s)
+            yield Choice(part.force_n, part.position_mm, hold_s=part.hold_s).press(approach, part.rest_s)
         case Sine():
-            yield _swing(part, approach)
+            course, most = (
+                approach.course((part.mean_n, part.cycles / part.frequency_hz)),
+                part.mean_n + part.amplitude_n,
+            )
+            wave = part.amplitude_n, part.frequency_hz
+            yield PlannedPress(part.position_mm, course, part.rest_s, most, most, wave=wave)
         case ForceSweep():
             for place in np.linspace(*part.position_mm, part.places).round(3).tolist():
-                yield _press(approach, place, part.force_n, 0.0, part.hold_s, part.rest_s)
+                yield Choice(part.force_n, place, hold_s=part.hold_s).press(approach, part.rest_s)
         case Next():
-            for _ in range(part.presses):
-                yield _step(nan, (), part.rest_s, nan)
+            yield from [PlannedPress(nan, (), part.rest_s, nan, nan)] * part.presses
 
 
-def _random(part: Random, approach: Approach, places: tuple[float, float]) -> Iterator[PlannedPress]:
+def _random(part: Random, places: tuple[float, float]) -> Iterator[Choice]:
     """Forces and places of a seeded plan; holds even in their logarithm, and a share reached from a higher force."""
     plan = RunPlan(part.seed, part.presses, part.force_n, places, 1.0, 0.0, part.repeats).steps()
     rng = np.random.default_rng([part.seed, 1])
@@ -574,33 +588,4 @@ def _random(part: Random, approach: Approach, places: tuple[float, float]) -> It
     shares = rng.uniform(0.2, 1.0, len(plan)).tolist()
     for press, hold, higher, share in zip(plan, holds, above.tolist(), shares, strict=True):
         peak = press.force_n + share * (part.force_n[1] - press.force_n) if higher else 0.0
-        yield _press(approach, press.position_mm, press.force_n, round(peak, 3), hold, part.rest_s)
-
-
-def _press(
-    approach: Approach, place_mm: float, force_n: float, peak_n: float, hold_s: float, rest_s: float
-) -> PlannedPress:
-    """Up to a force, over a higher one if there is one, hold, average, and down."""
-    course = [(0.0, approach.contact_n)]
-    if peak_n > force_n:
-        _extend(course, approach, peak_n, _AT_PEAK_S)
-    _extend(course, approach, force_n, hold_s + AVERAGED_S)
-    return replace(_step(place_mm, tuple(course), rest_s, force_n), peak_n=max(peak_n, force_n), hold_s=hold_s)
-
-
-def _extend(course: list[tuple[float, float]], approach: Approach, force_n: float, stay_s: float) -> None:
-    """Go to a force, and stay there."""
-    time_s, at_n = course[-1]
-    there_s = time_s + abs(force_n - at_n) / approach.rate_n_s
-    course += [(there_s, force_n), (there_s + stay_s, force_n)]
-
-
-def _swing(part: Sine, approach: Approach) -> PlannedPress:
-    course = [(0.0, approach.contact_n)]
-    _extend(course, approach, part.mean_n, part.cycles / part.frequency_hz)
-    step = _step(part.position_mm, tuple(course), part.rest_s, part.mean_n + part.amplitude_n)
-    return replace(step, wave=(part.amplitude_n, part.frequency_hz))
-
-
-def _step(place_mm: float, course: tuple[tuple[float, float], ...], rest_s: float, force_n: float) -> PlannedPress:
-    return PlannedPress(0, 0, "", place_mm, course, rest_s, force_n, force_n, 0.0)
+        yield Choice(press.force_n, press.position_mm, round(peak, 3), hold)

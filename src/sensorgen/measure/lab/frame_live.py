@@ -20,7 +20,7 @@ import numpy as np
 from sensorgen.core.arrays import Complex, Mask, Real, Whole
 from sensorgen.core.errors import BadInput, MissingValue
 from sensorgen.core.files import reading
-from sensorgen.measure.array_frames import swapped
+from sensorgen.measure.array_frames import HDF, swapped
 from sensorgen.measure.lab.devices import Clock, DeviceFault, FrameMeter
 from sensorgen.measure.lab.live import LiveView
 
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 PRESS_FRAMES = 20  # under load, by which a known press is compared
 _SIGMAS = 5.0  # pressure over its standard error from which on a frame is loaded [-]
-_HDF = (".h5", ".hdf5", ".hdf")
 _CHUNK = 64  # frames
 _COMPLEX = np.complex64  # seven digits, as of the stream
 
@@ -63,9 +62,7 @@ def recorder(path: Path, shape: tuple[int, int], frequency_hz: float) -> FrameFi
     """
     if there := [one for one in (path, _part(path)) if one.exists()]:
         raise BadInput(f"{there[0]} exists; expected a new name: recordings are not overwritten")
-    kind = (
-        _Csv if path.suffix == ".csv" else _Hdf if path.suffix in _HDF else _Packed if path.suffix == ".npz" else None
-    )
+    kind = _Csv if path.suffix == ".csv" else _Hdf if path.suffix in HDF else _Packed if path.suffix == ".npz" else None
     if kind is None:
         raise BadInput(f"{path}: expected a name that ends in .csv, .h5 or .npz")
     with reading(path):

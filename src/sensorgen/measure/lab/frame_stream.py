@@ -192,9 +192,11 @@ class FrameStream:
                     damaged += 1
                     continue
                 self._heard_s = self._clock.now()
-                if form := FrameForm.of(text):
-                    self._refuse_change(form)
+                if (form := FrameForm.of(text)) == self._form:
                     continue
+                if form:
+                    new, old = (of.header().decode().partition("*")[0].partition(" 1 ")[2] for of in (form, self._form))
+                    raise DeviceFault(f"{self._port.address}: the array is now {new}; expected {old}: begin anew")
                 missing, siemens, clipped = self._frame(text.split(","))
                 lost, saturated = lost + missing, saturated + clipped
                 times.append(self._time_s)
@@ -203,12 +205,6 @@ class FrameStream:
             heard = f"{damaged} damaged lines" if damaged else "nothing"
             raise DeviceFault(f"{self._port.address}: {heard} for {_SILENT_S:g} s; check cable, power and baud")
         return FrameLot(np.array(times), np.array(frames).reshape(-1, *self.shape), lost, damaged, saturated)
-
-    def _refuse_change(self, form: FrameForm) -> None:
-        """Refuse another header than the first."""
-        if form != self._form:
-            new, old = (of.header().decode().partition("*")[0].partition(" 1 ")[2] for of in (form, self._form))
-            raise DeviceFault(f"{self._port.address}: the array is now {new}; expected {old}: begin anew")
 
     def _frame(self, words: list[str]) -> tuple[int, Complex, int]:
         """Number of frames missing before one, its readings, and how many are saturated."""

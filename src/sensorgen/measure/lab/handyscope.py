@@ -66,10 +66,13 @@ class Bridge:
     range_v: float = 0.8
     gain: tuple[tuple[float, complex], ...] = ()
 
+    def gains(self, tones_hz: Real) -> Complex:
+        """Gain of (m,) tones."""
+        return np.array([dict(self.gain).get(float(f), 1.0) for f in tones_hz], complex)
+
     def transimpedance(self, tones_hz: Real) -> Complex:
         """Output over current, of (m,) tones [ohm]."""
-        gain = np.array([dict(self.gain).get(float(f), 1.0) for f in tones_hz], complex)
-        return np.asarray(-gain / (1 / self.feedback_ohm + 2j * np.pi * tones_hz * self.feedback_f))
+        return np.asarray(-self.gains(tones_hz) / (1 / self.feedback_ohm + 2j * np.pi * tones_hz * self.feedback_f))
 
 
 class _Gain(Strict):

@@ -159,7 +159,9 @@ class Loop:
         self.beat()
         if "actuator" in self.rig.started:
             self.extension = self.rig.actuator.read()
-            self._check_actuator()
+            if wrong := self._wrong():  # is lifted at once, in the same period
+                self.rig.actuator.lift()
+                raise DeviceFault(f"{wrong}: lifted")
             if isfinite(self.set_n):
                 self.rig.actuator.push(self.set_n)
         if "stage" in self.rig.started and self.count % _STAGE == 0:
@@ -204,16 +206,10 @@ class Loop:
         self.late += now - due > PERIOD_S
         self._last_s = due if now - due < PERIOD_S else now
 
-    def _check_actuator(self) -> None:
-        """Lift at once, in the same period, what leaves the limits."""
-        if wrong := self._wrong():
-            self.rig.actuator.lift()
-            raise DeviceFault(f"{wrong}: lifted")
-
     def _wrong(self) -> str:
         """Fault of the actuator's reading, or ""."""
         at, limits, now = self.extension, self.experiment.limits, self.clock.now()
-        if not (isfinite(at.force_n) and isfinite(at.position_mm)):
+        if not isfinite(at.force_n + at.position_mm):
             return "actuator: a force or position that is no number"
         if at.force_n > limits.force_n:
             return f"force {at.force_n:.2f} N is above the limit of {limits.force_n:g} N"
@@ -222,7 +218,7 @@ class Loop:
         deepest = min(limits.deepest_mm + _DEEP_MM, self.down_mm + _SUNK_MM if self.down else inf)
         if self.homed and at.position_mm > deepest:
             return f"actuator: at {at.position_mm:.2f} mm, deeper than {deepest:.2f} mm"
-        if not isfinite(self.set_n) or abs(at.force_n - self.set_n) < _FOLLOW_N + _FOLLOW_SHARE * self.set_n:
+        if not abs(at.force_n - self.set_n) >= _FOLLOW_N + _FOLLOW_SHARE * self.set_n:  # or none is set: nan
             self._follows_s = now
         if now - self._follows_s > _FOLLOW_S:
             return f"actuator: {at.force_n:.2f} N instead of {self.set_n:.2f} N for {_FOLLOW_S:g} s"

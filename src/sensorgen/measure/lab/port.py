@@ -41,21 +41,6 @@ class Port(Protocol):
         """Give the line back; never raises."""
 
 
-class Web(Protocol):
-    """A device that answers HTTP requests.
-
-    Attributes
-    ----------
-    address : str
-        For messages.
-    """
-
-    address: str
-
-    def get(self, path: str, timeout_s: float) -> tuple[int, bytes]:
-        """Status and content of one GET request; :class:`DeviceFault` if nothing answers."""
-
-
 @contextmanager
 def faults(address: str, what: str = "connection to {} failed", *also: type[Exception]) -> Iterator[None]:
     """Translate errors of a connection to DeviceFault."""

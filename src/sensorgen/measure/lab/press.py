@@ -114,7 +114,7 @@ def land(loop: Loop) -> None:
         raise DeviceFault(f"actuator: still at {at:.2f} mm after the command to land; check motor and power")
     if at > deepest - _STILL_MM:
         raise DeviceFault(f"no contact down to {at:.2f} mm (limits.deepest_mm); check specimen, place and height")
-    if isfinite(loop.contact_mm) and at < loop.contact_mm - _EARLY_MM:
+    if loop.contact_mm - at > _EARLY_MM:  # never of the first contact, which is nan before
         raise DeviceFault(f"contact at {at:.2f} mm, {loop.contact_mm - at:.1f} mm above the last; is something there?")
     loop.down_mm = loop.contact_mm = at
 
@@ -141,7 +141,9 @@ def press(loop: Loop, step: PlannedPress) -> DonePress:
     loop.wait(max(step.rest_s - (loop.clock.now() - loop.up_s), AVERAGED_S))
     before, noise = loop.watch.mean(), loop.watch.noise()
     loop.rest_ohm = before
-    _drift(loop)
+    drift, allowed = loop.watch.drift(), loop.experiment.stop.drift
+    if allowed and drift > allowed:
+        raise Ended("rule", f"stop.drift: abs(Z) at rest has changed by {drift:.2%}; {allowed:.2%} are allowed")
     loop.message = f"press {step.number}, {step.kind}"
     land(loop)
     begun = loop.clock.now()
@@ -152,12 +154,6 @@ def press(loop: Loop, step: PlannedPress) -> DonePress:
     lift(loop)
     loop.presses += 1
     return pressed
-
-
-def _drift(loop: Loop) -> None:
-    drift, allowed = loop.watch.drift(), loop.experiment.stop.drift
-    if allowed and drift > allowed:
-        raise Ended("rule", f"stop.drift: abs(Z) at rest has changed by {drift:.2%}; {allowed:.2%} are allowed")
 
 
 def pause(loop: Loop) -> None:

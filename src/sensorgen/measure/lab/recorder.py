@@ -7,14 +7,15 @@ the next run of the same log.
 """
 
 import json
+import mmap
 import os
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -22,11 +23,10 @@ from sensorgen.core import files, units
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, Unwritable
 from sensorgen.measure.lab.devices import Clock, Readings
+from sensorgen.measure.log import BenchRun, Log
+from sensorgen.measure.log.bench import log_recording
 
-if TYPE_CHECKING:
-    from sensorgen.measure.log import BenchRun, Log
-
-JOURNAL, EXPERIMENT = "journal.jsonl", "experiment.json"
+JOURNAL = "journal.jsonl"
 _SYNC_S = 0.5  # so that all that is older than a second is on the disk
 _RIG = "stamp_s,set_force_n,set_position_mm,force_n,error\n"
 
@@ -42,26 +42,20 @@ class Appended:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        try:
+        with self._faults():
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
-        except OSError as error:
-            raise self._failed(error) from None
 
     def write(self, text: str) -> None:
         """Append rows; with the system when this returns."""
         left = text.encode()
-        try:
+        with self._faults():
             while left:
                 left = left[os.write(self._file, left) :]
-        except OSError as error:
-            raise self._failed(error) from None
 
     def sync(self) -> None:
         """Return when all is on the disk, at its path."""
-        try:
+        with self._faults():
             os.fsync(self._file)
-        except OSError as error:
-            raise self._failed(error) from None
         if not self._there():
             raise Unwritable(f"{str(self._path)!r} was removed during the run")
 
@@ -69,13 +63,11 @@ class Appended:
         """Sync and close; a file that was removed is written again, and named as an error."""
         try:
             if not self._there():
-                with files.replacing(self._path) as copy:
+                with self._faults(), files.replacing(self._path) as copy:
                     for at in range(0, os.fstat(self._file).st_size, 1 << 20):
                         copy.write(os.pread(self._file, 1 << 20, at))
                 raise Unwritable(f"{str(self._path)!r} was removed during the run, and is written again")
             self.sync()
-        except OSError as error:
-            raise self._failed(error) from None
         finally:
             os.close(self._file)
 
@@ -85,8 +77,14 @@ class Appended:
             return os.path.samestat(os.fstat(self._file), self._path.stat())
         return False
 
-    def _failed(self, error: OSError) -> Unwritable:
-        return Unwritable(f"cannot write to {str(self._path)!r}: {error.strerror or error}; make room on the disk")
+    @contextmanager
+    def _faults(self) -> Iterator[None]:
+        """Translate errors of the file system to Unwritable."""
+        try:
+            yield
+        except OSError as error:
+            message = f"cannot write to {str(self._path)!r}: {error.strerror or error}; make room on the disk"
+            raise Unwritable(message) from None
 
 
 class SyncedFiles:
@@ -270,7 +268,7 @@ def alone(folder: Path) -> AbstractContextManager[bool]:
     return files.alone(folder / ".lock", wait=False)
 
 
-def log_attempts(log: "Log", folder: Path, clock: Clock) -> "list[BenchRun]":
+def log_attempts(log: Log, folder: Path, clock: Clock) -> list[BenchRun]:
     """Log the attempts of a run that the log does not have yet; hold the run's lock.
 
     What cannot be logged, as of a run that was killed before its first reading, is noted in the journal.
@@ -293,10 +291,7 @@ def log_attempts(log: "Log", folder: Path, clock: Clock) -> "list[BenchRun]":
     return rows
 
 
-def _logged(log: "Log", folder: Path, attempt: dict[str, Any]) -> "tuple[list[BenchRun], str]":
-    from sensorgen.measure.log import BenchRun
-    from sensorgen.measure.log.bench import log_recording
-
+def _logged(log: Log, folder: Path, attempt: dict[str, Any]) -> tuple[list[BenchRun], str]:
     recording, rig = folder / f"{attempt['stem']}.csv", folder / f"{attempt['stem']}-rig.csv"
     for path in (recording, rig):
         trim(path)
@@ -313,19 +308,14 @@ def _logged(log: "Log", folder: Path, attempt: dict[str, Any]) -> "tuple[list[Be
 
 def trim(path: Path) -> None:
     """Cut off a last row that is not whole."""
-    with suppress(FileNotFoundError), path.open("rb+") as file:
-        end = file.seek(0, os.SEEK_END)
-        while end:
-            begin = max(0, end - (1 << 16))
-            file.seek(begin)
-            at = file.read(end - begin).rfind(b"\n")
-            if at >= 0:
-                file.truncate(begin + at + 1)
-                return
-            end = begin
+    with suppress(FileNotFoundError, ValueError), path.open("rb+") as file:  # ValueError of an empty one
+        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+            end = content.rfind(b"\n") + 1
+        if end:
+            file.truncate(end)
 
 
-def recover(log: "Log", clock: Clock) -> "list[BenchRun]":
+def recover(log: Log, clock: Clock) -> list[BenchRun]:
     """Log what killed runs of a log have left; runs that go on in other processes are passed over."""
     rows: list[BenchRun] = []
     for folder in sorted(home(log.path).glob("*/")) if home(log.path).is_dir() else ():

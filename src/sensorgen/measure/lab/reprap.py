@@ -16,14 +16,14 @@ import urllib.parse
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.records import Line, Strict
 from sensorgen.measure.lab.devices import Clock, DeviceFault, Identity, Place, WrongDevice
-from sensorgen.measure.lab.port import HttpPort, Port, Web
+from sensorgen.measure.lab.port import HttpPort, Port
 
 BAUD = 57_600
 _ANSWER_S, _HOMING_S, _HTTP_S = 2.0, 120.0, 1.0
@@ -83,26 +83,15 @@ class FirmwareState:
     status: str
     axes_mm: tuple[float, ...]
 
-
-class FirmwareLink(Protocol):
-    """A way to the firmware."""
-
-    address: str
-
-    def identify(self) -> str:
-        """Answer to M115."""
-
-    def send(self, *codes: str) -> None:
-        """Send G-code without waiting for its end."""
-
-    def report(self) -> FirmwareState | None:
-        """Newest state that was asked for after all that was sent; None if there is none yet."""
-
-    def emergency(self) -> None:
-        """Stop at once."""
-
-    def close(self) -> None:
-        """Give the connection back."""
+    @classmethod
+    def of(cls, status: Any, axes_mm: Any, address: str) -> Self:
+        """State by the firmware's words; DeviceFault where they are none."""
+        if not isinstance(status, str):
+            raise DeviceFault(f"{address} has no state: {status!r:.60}")
+        try:
+            return cls(status, tuple(float(each) for each in axes_mm))
+        except (TypeError, ValueError):
+            raise DeviceFault(f"{address} has no positions of axes: {axes_mm!r:.60}") from None
 
 
 class SerialLink:
@@ -115,7 +104,7 @@ class SerialLink:
         self._since_s = 0.0
         self._lines: list[str] = []
         self._partial = b""
-        self._status = ""
+        self._told: dict[str, Any] = {}  # by question
         self._report: FirmwareState | None = None
         self._identifying = 0
 
@@ -196,16 +185,16 @@ class SerialLink:
         self._since_s = self._clock.now()
         if "Error" in text:
             raise DeviceFault(f"{self.address} answers {code!r} with {text!r:.120}")
-        if code == _STATUS:
-            self._status = _text(_result(text, self.address), self.address)
-        elif code == _AXES and not self._waiting:  # nothing was sent after the question
-            self._report = FirmwareState(self._status, _numbers(_result(text, self.address), self.address))
+        if code in _QUESTIONS:
+            self._told[code] = _object(text, self.address, "JSON of the object model").get("result")
+        if code == _AXES and not self._waiting:  # nothing was sent after the question
+            self._report = FirmwareState.of(self._told.get(_STATUS), self._told[_AXES], self.address)
 
 
 class WebLink:
     """The firmware at an address of HTTP: one request at a time, each at most a second."""
 
-    def __init__(self, web: Web, clock: Clock, password: str) -> None:
+    def __init__(self, web: HttpPort, clock: Clock, password: str) -> None:
         self.address = web.address
         self._web, self._clock, self._password = web, clock, password
         self._replies = 0
@@ -230,7 +219,7 @@ class WebLink:
     def send(self, *codes: str) -> None:
         """Put G-code into the firmware's buffer, as one request so that it goes in whole or not at all."""
         text = urllib.parse.quote("\n".join(codes))
-        answer = self._json(self._get(f"/rr_gcode?gcode={text}"))
+        answer = _object(self._get(f"/rr_gcode?gcode={text}"), self.address)
         if answer.get("err") or "buff" not in answer:
             raise DeviceFault(f"{self.address} does not take {codes[0]!r} ...: {answer!r:.80}; its buffer is full")
         self._report, self._next_s = None, -math.inf
@@ -301,7 +290,7 @@ class WebLink:
         self._busy = 0 if text else self._busy + 1
         if self._busy > 5:
             raise DeviceFault(f"{self.address} is short of memory again and again (status 503)")
-        result = _result(text, self.address) if text else {}
+        result = _object(text, self.address, "JSON of the object model").get("result") if text else {}
         if not isinstance(result, dict):
             raise DeviceFault(f"{self.address} sends no object model: {text!r:.60}")
         return result
@@ -310,30 +299,21 @@ class WebLink:
         sequence = model.get("seqs", {})
         return int(sequence.get("reply", self._replies)) if isinstance(sequence, dict) else self._replies
 
-    def _json(self, text: str) -> dict[str, Any]:
-        try:
-            answer = json.loads(text)
-        except ValueError:
-            answer = None
-        if not isinstance(answer, dict):
-            raise DeviceFault(f"{self.address} answers {text!r:.60}; expected JSON")
-        return answer
-
 
 class RepRapStage:
     """Driver of the gantry.
 
     Parameters
     ----------
-    link : FirmwareLink
-        Serial or HTTP.
+    link : SerialLink or WebLink
+        Way to the firmware.
     clock : Clock
         Of the run.
     settings : Settings
         Of this gantry.
     """
 
-    def __init__(self, link: FirmwareLink, clock: Clock, settings: Settings | None = None) -> None:
+    def __init__(self, link: SerialLink | WebLink, clock: Clock, settings: Settings | None = None) -> None:
         self.settings = settings or Settings()
         self._link, self._clock = link, clock
         self._known = False
@@ -434,25 +414,15 @@ class RepRapStage:
 def stage(port: Any, clock: Clock, settings: Settings) -> RepRapStage:
     """Driver at a serial line or an address of HTTP."""
     web = isinstance(port, HttpPort)
-    link: FirmwareLink = WebLink(port, clock, settings.password) if web else SerialLink(port, clock)
-    return RepRapStage(link, clock, settings)
+    return RepRapStage(WebLink(port, clock, settings.password) if web else SerialLink(port, clock), clock, settings)
 
 
-def _result(text: str, address: str) -> object:
+def _object(text: str, address: str, expected: str = "JSON") -> dict[str, Any]:
+    """JSON object of an answer."""
     try:
-        return json.loads(text)["result"]
-    except (ValueError, KeyError, TypeError):
-        raise DeviceFault(f"{address} answers {text!r:.80}; expected JSON of the object model") from None
-
-
-def _text(value: object, address: str) -> str:
-    if not isinstance(value, str):
-        raise DeviceFault(f"{address} has no state: {value!r:.60}")
-    return value
-
-
-def _numbers(value: object, address: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(each) for each in value)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        raise DeviceFault(f"{address} has no positions of axes: {value!r:.60}") from None
+        answer = json.loads(text)
+    except ValueError:
+        answer = None
+    if not isinstance(answer, dict):
+        raise DeviceFault(f"{address} answers {text!r:.80}; expected {expected}")
+    return answer

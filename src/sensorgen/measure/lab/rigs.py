@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from typing import Any, cast
 
 from sensorgen.core.errors import BadInput, within
@@ -117,11 +116,5 @@ def meter(kind: str | None, address: str) -> Meter:
 def _has_role(role: str, device: Device) -> None:
     has = catalogue.kind(device.kind).role
     if has != role:
-        known = [name for name in catalogue.names() if _role(name) == role]
+        known = [name for name, other in catalogue.roles().items() if other == role]
         raise BadInput(f"kind {device.kind!r} is of the role {has}; expected one of {', '.join(known)}")
-
-
-def _role(name: str) -> str:
-    with suppress(BadInput):
-        return catalogue.kind(name).role
-    return ""

@@ -7,11 +7,10 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from math import ceil, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from sensorgen.core.arrays import Real
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.core.version import __version__
@@ -25,16 +24,14 @@ from sensorgen.measure.lab.loop import Alive, Loop, Paused, Predicted, RunView
 from sensorgen.measure.lab.recorder import Recorder, RunFolder
 from sensorgen.measure.lab.safety import Ended, RunDevices
 from sensorgen.measure.lab.watch import Watch
-from sensorgen.measure.log import notes
-from sensorgen.measure.log.entries import BenchRun
-
-if TYPE_CHECKING:
-    from sensorgen.measure.log import Log
+from sensorgen.measure.log import BenchRun, Log, notes
 
 Confirm = Callable[["PlannedRun", dict[str, Identity]], bool]
 """Whether the rig may move, by what is planned and what each device said that it is."""
 WATCHDOG_S = 1.5  # without a reading, until the actuator's controller lifts
 UNWATCHED_N = 1.0  # highest limits.force_n without that: the weight of the piston alone is 0.9 N
+_PLANNED = ("place_mm", "force_n", "peak_n", "hold_s")  # of a press that was done, in the journal
+_MEASURED = ("before_ohm", "pressed_ohm", "noise")
 USUAL_MM = 100.0  # length of a specimen whose design is unknown
 
 
@@ -85,17 +82,13 @@ class RunResult:
         """Outcome, recordings and problems."""
         yield f"{self.specimen}: {self.done} of {self.steps} presses{', simulated' if self.simulated else ''}"
         facts = [("end", f"{self.end}: {self.reason}"), ("tip", "up" if self.tip_up else "NOT KNOWN TO BE UP")]
-        facts += [("device", f"{role}: {_named(who)}") for role, who in self.identities.items()]
+        facts += [("device", f"{role}: {who.words()}") for role, who in self.identities.items()]
         facts += [("readings", ", ".join(f"{count} {name}" for name, count in self.counts.items()))]
         facts += [("log", f"recording {row.number}") for row in self.rows] or [("log", "no new recording")]
         facts += [("problem", problem) for problem in self.problems]
         yield Facts((*facts, ("run", self.folder)))
         if self.done < self.steps:
             yield f"go on: sensorgen bench run --resume {Path(self.folder).name}"
-
-
-def _named(who: Identity) -> str:
-    return " ".join(filter(None, (who.model, who.serial, who.firmware)))
 
 
 @dataclass(frozen=True)
@@ -131,7 +124,7 @@ class PlannedRun:
         )
 
 
-def planned(experiment: Experiment, log: "Log | None" = None) -> PlannedRun:
+def planned(experiment: Experiment, log: Log | None = None) -> PlannedRun:
     """Check an experiment against its specimen, and make its presses; nothing moves.
 
     Raises
@@ -141,7 +134,8 @@ def planned(experiment: Experiment, log: "Log | None" = None) -> PlannedRun:
     """
     with within("specimen"):
         notes.specimen(experiment.specimen, log)
-    length = experiment.length_mm or _length_mm(design_of(experiment, log))
+    design = None if experiment.length_mm else design_of(experiment, log)
+    length = experiment.length_mm or (float(design.params.length_mm) if design else USUAL_MM)
     experiments.check(experiment, length, 0.0)  # its places, before presses are made of them
     steps = experiments.steps(experiment, length)
     holds = [part.content.hold_s[1] for part in experiment.plan if isinstance(part.content, Next)]
@@ -150,7 +144,7 @@ def planned(experiment: Experiment, log: "Log | None" = None) -> PlannedRun:
     return PlannedRun(experiment, length, tuple(steps), seconds)
 
 
-def design_of(experiment: Experiment, log: "Log | None") -> Design | None:
+def design_of(experiment: Experiment, log: Log | None) -> Design | None:
     """Design of the specimen: the virtual one's own, else that in the log, else the one that its name stands for."""
     from sensorgen.measure.log import prints
 
@@ -166,12 +160,8 @@ def design_of(experiment: Experiment, log: "Log | None") -> Design | None:
         return None
 
 
-def _length_mm(design: Design | None) -> float:
-    return float(design.params.length_mm) if design else USUAL_MM
-
-
 def run(
-    experiment: Experiment, *, clock: Clock, log: "Log", rig: RunDevices, simulated: bool, view: RunView | None = None,
+    experiment: Experiment, *, clock: Clock, log: Log, rig: RunDevices, simulated: bool, view: RunView | None = None,
     controls: Controls | None = None, guardian: Alive | None = None, next_press: NextPress | None = None,
     predicted: Predicted | None = None, resume: Path | None = None, confirm: Confirm = lambda *_: True,
     watchdog: bool = True,
@@ -237,7 +227,7 @@ class _Attempt:
     """One attempt at a run: the first, or one that resumes it."""
 
     def __init__(
-        self, plan: PlannedRun, clock: Clock, log: "Log", rig: RunDevices, folder: Path, simulated: bool,
+        self, plan: PlannedRun, clock: Clock, log: Log, rig: RunDevices, folder: Path, simulated: bool,
         next_press: NextPress | None, confirm: Confirm, watchdog: bool,
     ) -> None:  # fmt: skip
         self.plan, self.clock, self.log, self.rig, self.folder = plan, clock, log, rig, folder
@@ -349,7 +339,7 @@ class _Attempt:
                 loop.pausable = False
             self.done.add(step.number)
             loop.recorder.journal.note("done", step=step.number, **_kept(pressed))
-            if all(np.isfinite(values).all() for values in (pressed.before_ohm, pressed.pressed_ohm, pressed.noise)):
+            if all(np.isfinite(getattr(pressed, name)).all() for name in _MEASURED):
                 self.pressed.append(pressed)
             return True
 
@@ -380,9 +370,8 @@ class _Attempt:
                   "late periods": loop.late}  # fmt: skip
         failed = list(problems)
         try:
-            recording.state(
-                0.0, loop.wanted_mm if isfinite(loop.wanted_mm) else 0.0, float("nan"), _error_of(end, reason)
-            )
+            place_mm = loop.wanted_mm if isfinite(loop.wanted_mm) else 0.0
+            recording.state(0.0, place_mm, float("nan"), reason if end == "fault" else "")
             recording.journal.note("ended", attempt=self.number, end=end, reason=reason, tip_up=up, problems=problems,
                               counts=counts)  # fmt: skip
         except SensorgenError as error:
@@ -403,10 +392,6 @@ class _Attempt:
         )  # fmt: skip
 
 
-def _error_of(end: str, reason: str) -> str:
-    return reason if end == "fault" else ""
-
-
 def _beside(loop: Loop, choose: Callable[[], Choice]) -> Choice:
     """Choose while the loop goes on, tip up; with a simulated clock at once."""
     if isinstance(loop.clock, SimulatedClock):
@@ -419,18 +404,10 @@ def _beside(loop: Loop, choose: Callable[[], Choice]) -> Choice:
 
 
 def _kept(pressed: DonePress) -> dict[str, Any]:
-    """Part of a press that the journal keeps."""
-    step = pressed.step
-    return {
-        "place_mm": step.place_mm, "force_n": step.force_n, "peak_n": step.peak_n, "hold_s": step.hold_s,
-        "noise": _numbers(pressed.noise),
-        **{name: _numbers(getattr(pressed, name).view(float)) for name in ("before_ohm", "pressed_ohm")},
-    }  # fmt: skip
-
-
-def _numbers(values: Real) -> list[float] | None:
-    """For JSON, which has no nan."""
-    return values.tolist() if np.isfinite(values).all() else None
+    """Part of a press that the journal keeps; null for numbers of which some are nan, which JSON has not."""
+    values = {name: getattr(pressed, name).view(float) for name in _MEASURED}
+    known = {name: each.tolist() if np.isfinite(each).all() else None for name, each in values.items()}
+    return {name: getattr(pressed.step, name) for name in _PLANNED} | known
 
 
 def _pressed(before: RunFolder, steps: Sequence[PlannedPress]) -> list[DonePress]:
@@ -439,8 +416,8 @@ def _pressed(before: RunFolder, steps: Sequence[PlannedPress]) -> list[DonePress
     presses = []
     for event in before.of("done"):
         step = by_number.get(event["step"])
-        if step and all(event[name] for name in ("before_ohm", "pressed_ohm", "noise")):
-            values = {name: event[name] for name in ("place_mm", "force_n", "peak_n", "hold_s")}
+        if step and all(event[name] for name in _MEASURED):
+            values = {name: event[name] for name in _PLANNED}
             at_rest, after = (np.array(event[name]).view(complex) for name in ("before_ohm", "pressed_ohm"))
             presses.append(DonePress(replace(step, **values), at_rest, after, np.array(event["noise"])))
     return presses

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import filterfalse
 from math import inf
 
 from sensorgen.core.errors import SensorgenError
@@ -114,18 +115,17 @@ def _lift(rig: RunDevices, clock: Clock, attempt: _Attempts) -> dict[str, bool]:
         place = rig.stage.read()
         up["stage"] = not place.moving and (rig.working_mm == inf or place.height_mm >= rig.working_mm + RAISED_MM)
 
+    lifts = {"actuator": rig.actuator.lift, "stage": rig.stage.lift}
+    looks = {"actuator": look_actuator, "stage": look_stage}
     while not all(up.values()) and clock.now() < (until if not up.get("stage") else until - _LIFT_S + _DEAF_S):
+        down = list(filterfalse(up.get, up))
         if clock.now() >= again:
             again = clock.now() + _AGAIN_S
-            if not up.get("actuator", True):
-                attempt("lift of the actuator", rig.actuator.lift)
-            if not up.get("stage", True):
-                attempt("lift of the stage", rig.stage.lift)
+            for role in down:
+                attempt(f"lift of the {role}", lifts[role])
         clock.wait_until(clock.now() + _POLL_S)
-        if not up.get("actuator", True):
-            attempt("actuator", look_actuator)
-        if not up.get("stage", True):
-            attempt("stage", look_stage)
+        for role in down:
+            attempt(role, looks[role])
     return up
 
 

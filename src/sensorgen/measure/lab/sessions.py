@@ -4,10 +4,10 @@ import queue
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
@@ -31,15 +31,11 @@ from sensorgen.measure.lab.guardian import Guardian, Orders
 from sensorgen.measure.lab.live import LiveText, LiveView, Sample
 from sensorgen.measure.lab.run import Confirm, RunResult, design_of, planned, run
 from sensorgen.measure.lab.safety import RunDevices
+from sensorgen.measure.log import Log
+from sensorgen.measure.virtual.mechanics import VirtualRig
 from sensorgen.prediction.calibration.fitting import NOISE, Data, Posterior, by_rest, calibrated
 from sensorgen.prediction.calibration.next_press import NextPress, PossiblePresses
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, unknown
-
-if TYPE_CHECKING:
-    from sensorgen.measure.log import Log
-    from sensorgen.measure.virtual.mechanics import VirtualRig as Mechanism
-    from sensorgen.prediction.calibration.specimen import SpecimenModel
-
 
 _POLL_S, _LONGEST_S = 0.005, 5.0  # between two questions; longer than any answer takes
 
@@ -217,7 +213,7 @@ def new(path: Path, *, simulate: bool) -> SessionTask:
     return SessionTask(experiment, simulate)
 
 
-def again(log: "Log", name: str) -> SessionTask:
+def again(log: Log, name: str) -> SessionTask:
     """A run that ended early, by its folder or the folder's name.
 
     Raises
@@ -241,7 +237,7 @@ def again(log: "Log", name: str) -> SessionTask:
 class Views:
     """Several views as one; one that fails is left out, and the run goes on."""
 
-    def __init__(self, views: "list[LiveView | LiveText]") -> None:
+    def __init__(self, views: list[LiveView | LiveText]) -> None:
         self._views = views
 
     def update(self, sample: Sample) -> None:
@@ -287,18 +283,18 @@ class Session:
     """
 
     def __init__(
-        self, asked: SessionTask, log: "Log", *, real_time: bool = False, page: bool = False, text: bool = True,
-        model: "Callable[[Design, Experiment], SpecimenModel] | None" = None,
+        self, asked: SessionTask, log: Log, *, real_time: bool = False, page: bool = False, text: bool = True,
+        model: Callable[[Design, Experiment], SpecimenModel] | None = None,
     ) -> None:  # fmt: skip
         self._asked, self._log, self._stack = asked, log, ExitStack()
         experiment = asked.experiment
         plan = planned(experiment, log)  # refuses what is wrong before a line is opened
-        self._clock: Clock = SimulatedClock() if asked.simulated and not real_time else RealClock()
-        if isinstance(self._clock, SimulatedClock):
-            self._clock = replace(self._clock, epoch_s=RealClock().epoch())
+        self._clock: Clock = RealClock()
+        if asked.simulated and not real_time:
+            self._clock = SimulatedClock(epoch_s=self._clock.epoch())
         needed = page or any(part.kind == "next" for part in experiment.plan)
         self._model = ByModel(model(_design(experiment, log), experiment)) if needed and model else None
-        self.mechanism: Mechanism | None = None
+        self.mechanism: VirtualRig | None = None
         self.url, views = "", list[LiveView | LiveText]()
         if page:
             view = self._stack.enter_context(LiveView(plan.summary(), experiment.readout.tones_hz))
@@ -347,7 +343,7 @@ class Session:
         )  # fmt: skip
 
 
-def _design(experiment: Experiment, log: "Log") -> Design:
+def _design(experiment: Experiment, log: Log) -> Design:
     design = design_of(experiment, log)
     if design is None:
         raise BadInput(f"no design is known of {experiment.specimen!r:.80}; give virtual.design, or bind it to one: "

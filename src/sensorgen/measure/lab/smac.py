@@ -284,7 +284,8 @@ class SmacActuator:
         self._follows(units, time_s)
         if self._state.homing_s is not None:
             self._home(status, time_s)
-        return Extension(time_s, self._force(units, count), self._position(count))
+        position_mm = count * self.settings.mm_per_count if self._state.homed else self.settings.stroke_mm
+        return Extension(time_s, self._force(units, count), position_mm)
 
     def _feed(self, now: float) -> None:
         """Set the watchdog's timer again; DeviceFault where it has lifted the piston."""
@@ -410,16 +411,12 @@ class SmacActuator:
             state.direction = 1 if count > state.count else -1
             state.count = count
         return (
-            units * self.settings.newton_per_unit
-            + self.settings.weight_n
-            - state.direction * self.settings.friction_n
-        )  # fmt: skip
-
-    def _position(self, count: int) -> float:
-        return count * self.settings.mm_per_count if self._state.homed else self.settings.stroke_mm
+            units * self.settings.newton_per_unit + self.settings.weight_n - state.direction * self.settings.friction_n
+        )
 
     def _set(self, *pairs: tuple[int, int], node: int | None = None) -> None:
-        self._port.write(_writes(pairs, self.settings.node if node is None else node))
+        to = self.settings.node if node is None else node
+        self._port.write(b"".join(b"%d W 0x%X %d\r" % (to, what, value) for what, value in pairs))
 
     def _ask(self, *objects: int) -> list[int]:
         """Values of objects, asked for in one message; after three failures the motor is switched off."""
@@ -477,10 +474,6 @@ def _raising(settings: Settings) -> list[tuple[int, int]]:
 def _command(what: int, value: int) -> int:
     """Command of a macro that sets an object: sub-index, index, bytes of the value, value."""
     return (what >> 16) << 56 | (what & 0xFFFF) << 40 | _BYTES[what] << 36 | value % (1 << 8 * _BYTES[what])
-
-
-def _writes(pairs: Iterable[tuple[int, int]], node: int) -> bytes:
-    return b"".join(b"%d W 0x%X %d\r" % (node, what, value) for what, value in pairs)
 
 
 def _parsed(line: bytes, asked: str) -> tuple[int, int]:

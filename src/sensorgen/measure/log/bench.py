@@ -7,7 +7,6 @@ import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
@@ -125,12 +124,15 @@ class RecordingFacts:
             yield from self.rig.words()
 
 
+_SAME_NAMES: Mapping[str, str] = MappingProxyType({})
 _CLOCK = ("offset_s", "offset_error_s", "skew", "skew_error", "explained")
 
 
 def to_json(facts: RecordingFacts) -> str:
     """Facts as JSON."""
-    return str(_adapter().dump_json(facts, exclude_none=facts.rig is None).decode())
+    from sensorgen.core.records import adapter
+
+    return adapter(RecordingFacts).dump_json(facts, exclude_none=facts.rig is None).decode()
 
 
 def from_json(text: str) -> RecordingFacts:
@@ -143,10 +145,10 @@ def from_json(text: str) -> RecordingFacts:
     """
     from pydantic import ValidationError
 
-    from sensorgen.core.records import problem
+    from sensorgen.core.records import adapter, problem
 
     try:
-        facts: RecordingFacts = _adapter().validate_json(text)
+        facts: RecordingFacts = adapter(RecordingFacts).validate_json(text)
     except ValidationError as error:
         raise BadInput(f"the facts of a recording are damaged: {problem(error, _plain(text))}") from None
     return facts
@@ -159,13 +161,6 @@ def _plain(text: str) -> Any:
         return text
 
 
-@cache
-def _adapter() -> Any:
-    from pydantic import TypeAdapter
-
-    return TypeAdapter(RecordingFacts)
-
-
 def summarised(
     parts: "Iterable[tuple[Recording, ...]]", columns: dict[str, str], rig: "RigLog | None", rig_columns: dict[str, str]
 ) -> RecordingFacts:
@@ -173,26 +168,28 @@ def summarised(
     from sensorgen.measure.recording import joined_all
 
     lockins: dict[int, LockIn] = {}
-    beside, fault = None, None
+    beside, faults = None, list[BadInput]()
     for recordings in parts:
         marked = recordings
         if rig:
             try:
                 joined = joined_all(recordings, rig)
             except BadInput as error:
-                fault = fault or error
+                faults.append(error)
             else:
                 marked = tuple(one.recording for one in joined)  # joining marks the rig's errors
                 beside = _with_rig(beside, joined[0], rig)
         for one in map(lockin, marked):
-            lockins[one.lockin] = _longer(lockins[one.lockin], one) if one.lockin in lockins else one
-    if rig and beside is None and fault:  # as of a sensor with a hole, which does not respond to the force
-        beside = RigDay(len(rig.time_s), int(rig.error.sum()), clocks=f"not joined with the rig: {fault}")
+            lockins[one.lockin] = _longer(lockins.get(one.lockin), one)
+    if rig and beside is None and faults:  # as of a sensor with a hole, which does not respond to the force
+        beside = RigDay(len(rig.time_s), int(rig.error.sum()), clocks=f"not joined with the rig: {faults[0]}")
     return RecordingFacts(tuple(lockins.values()), dict(columns), dict(rig_columns), beside)
 
 
-def _longer(before: LockIn, part: LockIn) -> LockIn:
+def _longer(before: LockIn | None, part: LockIn) -> LockIn:
     """Summary with one more part."""
+    if before is None:
+        return part
     counts = {name: count + part.counts[name] for name, count in before.counts.items()}
     return replace(before, counts=counts, seconds=part.seconds, notes=(*before.notes, *part.notes))
 
@@ -201,8 +198,8 @@ def _with_rig(before: RigDay | None, first: "Joined", rig: "RigLog") -> RigDay:
     samples = first.recording.counts()["rig error"]
     if before:
         return replace(before, samples=before.samples + samples)
-    numbers: dict[str, Any] = {name: _known(getattr(first, name)) for name in _CLOCK}
-    return RigDay(**rig.counts(), samples=samples, clocks=first.clock_text(), notes=first.notes, **numbers)
+    numbers: dict[str, Any] = {name: _known(getattr(first.clocks, name)) for name in _CLOCK}
+    return RigDay(**rig.counts(), samples=samples, clocks=first.clocks.words(), notes=first.notes, **numbers)
 
 
 def lockin(recording: "Recording") -> LockIn:
@@ -218,9 +215,6 @@ def lockin(recording: "Recording") -> LockIn:
 def _known(value: float) -> float | None:
     """The number, or None for nan and infinity, which JSON lacks."""
     return value if math.isfinite(value) else None
-
-
-_SAME_NAMES: Mapping[str, str] = MappingProxyType({})
 
 
 def log_recording(
@@ -275,11 +269,13 @@ def log_recording(
     raw_files = [files.keep(log.files, path) for path in paths]
     if raw_files != before:
         raise BadInput(f"{str(recording)!r} {files.CHANGED}")
-    identity = " ".join(filter(None, (of.specimen, *(file.uid for file in raw_files), supersedes)))
+    uids = [file.uid for file in raw_files]
+    identity = " ".join(filter(None, (of.specimen, *uids, supersedes)))
+    file, rig_file = (*uids, "")[:2]
     run = BenchRun(
         **vars(of), uid=sha256(identity.encode()).hexdigest()[:32], written=specimen, design_id=design_id,
-        design=design, source=recording.name, remark=remark, supersedes=supersedes, file=raw_files[0].uid,
-        rig_file=raw_files[1].uid if rig else "", facts=to_json(summary),
+        design=design, source=recording.name, remark=remark, supersedes=supersedes, file=file, rig_file=rig_file,
+        facts=to_json(summary),
     )  # fmt: skip
     return [row for row in log.add([*raw_files, run]) if isinstance(row, BenchRun)]
 

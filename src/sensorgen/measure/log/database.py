@@ -14,7 +14,7 @@ import sqlite3
 import struct
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from datetime import UTC, datetime
 from importlib.resources import files
@@ -23,9 +23,9 @@ from typing import Any
 
 from sensorgen.core.errors import BadInput, SensorgenError, Unwritable
 from sensorgen.core.files import part_of, remove_stale_parts, sync_folder
-from sensorgen.measure.log import chain
+from sensorgen.measure.log import chain, entries
 from sensorgen.measure.log.chain import Record
-from sensorgen.measure.log.entries import INDEXED, KINDS, Migration, columns, encode, indexed
+from sensorgen.measure.log.entries import Entry, Migration
 
 APPLICATION_ID = 0x53474C47  # in the header of the file: "SGLG"
 
@@ -51,16 +51,55 @@ STEPS = (  # migrations from each version to the next
     _step("version3.sql", "record"),
 )
 VERSION = len(STEPS)
-_COLUMNS = ("sequence", "id", "parents", "kind", "version", "logged_at", "content", "number", *INDEXED)
+_COLUMNS = ("sequence", "id", "parents", "kind", "version", "logged_at", "content", "number", *entries.INDEXED)
 _INSERT = f"INSERT INTO record ({', '.join(_COLUMNS)}) VALUES ({', '.join('?' * len(_COLUMNS))})"  # noqa: S608
 
 
-def insert(
-    connection: sqlite3.Connection, record: Record, sequence: int, number: int | None, index: Iterable[str | int | None]
-) -> None:
-    """Store a record with its number among all, and among its kind, and its entries of the index."""
-    of = (record.id, ",".join(record.parents), record.kind, record.version, record.logged_at, record.content)
-    connection.execute(_INSERT, [sequence, *of, number, *index])
+class Appender:
+    """Appends records within a transaction, each with its number among those of its kind.
+
+    Attributes
+    ----------
+    sequence : int
+        Number of the last record.
+    head : str
+        Its identity; "" in an empty log.
+    """
+
+    def __init__(self, connection: sqlite3.Connection, sequence: int = 0, head: str = "") -> None:
+        self._connection = connection
+        self.sequence, self.head = sequence, head
+        self._numbers: dict[str, int] = {}
+
+    @property
+    def heads(self) -> list[str]:
+        """The last record, if there is one."""
+        return [self.head] if self.head else []
+
+    def add(self, entry: Entry, now: str, heads: Sequence[str] = ()) -> int:
+        """Append the record of a row, behind the last one or behind several; its number among its kind."""
+        kind, content = entries.NAMES[type(entry)], entries.content_of(entry)
+        record = chain.made(heads or self.heads, kind, entries.VERSIONS.get(kind, 1), now, entries.encoded(content))
+        return self.append(record, entries.index(content))
+
+    def append(self, record: Record, index: Sequence[str | int | None], *, copy: bool = False) -> int:
+        """Append a record with its entries of the index; a copy of a row that the log has gets no number of its own."""
+        if record.kind not in self._numbers:
+            sql = "SELECT max(number) FROM record WHERE kind = ?"
+            self._numbers[record.kind] = self._connection.execute(sql, [record.kind]).fetchone()[0] or 0
+        self._numbers[record.kind] += not copy
+        number = None if copy else self._numbers[record.kind]
+        self.sequence, self.head = self.sequence + 1, record.id
+        of = (record.id, ",".join(record.parents), record.kind, record.version, record.logged_at, record.content)
+        self._connection.execute(_INSERT, [self.sequence, *of, number, *index])
+        return number or 0
+
+    def finish(self) -> None:
+        """Note the last record apart, so that rows missing at the end are noticed."""
+        if self._numbers:
+            sql = "INSERT INTO head VALUES (1, ?, ?) ON CONFLICT DO UPDATE SET sequence = excluded.sequence, " \
+                  "id = excluded.id"  # fmt: skip
+            self._connection.execute(sql, [self.sequence, self.head])
 
 
 _TABLES = ("raw_file", "batch", "print", "reading", "bench_run", "prediction")  # a row before those that refer to it
@@ -84,41 +123,31 @@ def to_records(connection: sqlite3.Connection, version: int) -> None:
     if not present.issuperset(_DROPPED):
         return
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    head, sequence = "", 0
+    writer = Appender(connection)
     rows = heapq.merge(*(_rows(connection, table) for table in _TABLES), key=lambda row: row[0])
-    for logged_at, table, number, content in rows:
+    for logged_at, table, content in rows:
         at = logged_at if _TIME.fullmatch(logged_at) else now
-        head, sequence = _append(connection, head, sequence, table, at, content, number)
-    if sequence:
-        content = encode(Migration(uid="", version=version, rows=sequence))
-        head, sequence = _append(connection, head, sequence, "migration", now, content, 1)
-        connection.execute("INSERT INTO head VALUES (1, ?, ?)", [sequence, head])
+        writer.append(chain.made(writer.heads, table, 1, at, content), entries.indexed(content))
+    if writer.sequence:
+        writer.add(Migration(uid="", version=version, rows=writer.sequence), now)
+    writer.finish()
     for table in _DROPPED:
         connection.execute(f"DROP TABLE {table}")
 
 
-def _append(
-    connection: sqlite3.Connection, head: str, sequence: int, kind: str, logged_at: str, content: str, number: int
-) -> tuple[str, int]:
-    record = chain.made([head] if head else [], kind, 1, logged_at, content)
-    insert(connection, record, sequence + 1, number, indexed(content))
-    return record.id, sequence + 1
-
-
-def _rows(connection: sqlite3.Connection, table: str) -> Iterator[tuple[str, str, int, str]]:
-    """Time, table, number and content of the rows of a table."""
-    joined = "NATURAL JOIN specimen" if "specimen" in columns(KINDS[table]) else ""
+def _rows(connection: sqlite3.Connection, table: str) -> Iterator[tuple[str, str, str]]:
+    """Time, table and content of the rows of a table."""
+    joined = "NATURAL JOIN specimen" if "specimen" in entries.COLUMNS[entries.KINDS[table]] else ""
     cursor = connection.cursor()
     cursor.row_factory = sqlite3.Row
-    rows = cursor.execute(f"SELECT * FROM {table} {joined} ORDER BY number")  # noqa: S608
-    for number, row in enumerate(rows, 1):
-        yield str(row["logged_at"]), table, number, _content(table, row)
+    for row in cursor.execute(f"SELECT * FROM {table} {joined} ORDER BY number"):  # noqa: S608
+        yield str(row["logged_at"]), table, _content(table, row)
 
 
 def _content(table: str, row: Any) -> str:
-    kind = KINDS[table]
+    kind = entries.KINDS[table]
     parts = []
-    for name, annotation in columns(kind).items():
+    for name, annotation in entries.COLUMNS[kind].items():
         if name not in row.keys() or name in ("number", "logged_at") or row[name] is None:  # noqa: SIM118 - sqlite3.Row
             continue
         value: object = row[name]

@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache, lru_cache
-from operator import attrgetter, eq
+from operator import eq
 from types import NoneType
 from typing import Any, Self, TypeVar, cast, get_args, get_type_hints
 
@@ -400,7 +400,8 @@ REFERENCES: dict[type[Entry], dict[str, type[Entry]]] = {
 Value = str | int | float | bool | tuple[float, ...] | tuple[str, ...] | None
 UNHASHED = ("number", "logged_at")  # given by the log, and by the record
 INDEXED: dict[str, type] = {"uid": str, "specimen": str, "iteration": int, "design_id": str, "supersedes": str}
-_COLUMNS: dict[type[Entry], dict[str, Any]] = {kind: get_type_hints(kind) for kind in KINDS.values()}
+COLUMNS: dict[type[Entry], dict[str, Any]] = {kind: get_type_hints(kind) for kind in KINDS.values()}
+"""Fields of rows with their types, by kind."""
 _Kinds = tuple[bool, Any, frozenset[type]]
 
 
@@ -418,41 +419,27 @@ def _kinds(annotation: Any) -> _Kinds:
 _ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"))
 _HELD: dict[type[Entry], dict[str, tuple[_Kinds, object]]] = {  # by a record: types and defaults
     kind: {f.name: (_kinds(of[f.name]), f.default) for f in fields(kind) if f.name not in UNHASHED}
-    for kind, of in _COLUMNS.items()
+    for kind, of in COLUMNS.items()
 }
 _PLAIN: dict[type[Entry], dict[str, type | None]] = {  # type that a field's value may have as it is
     kind: {name: of if of in (str, int, bool) else None for name, ((_, of, _), _) in held.items()}
     for kind, held in _HELD.items()
 }
-_USUAL = {kind: tuple(usual for _, usual in held.values()) for kind, held in _HELD.items()}
-_OPTIONAL = {kind: {f.name: f.default for f in fields(kind) if f.default is not MISSING} for kind in _COLUMNS}
-_VALUES = {kind: attrgetter(*held) for kind, held in _HELD.items()}
+_OPTIONAL = {kind: {f.name: f.default for f in fields(kind) if f.default is not MISSING} for kind in COLUMNS}
 _REQUIRED = {kind: {name for name, (_, usual) in held.items() if usual is MISSING} for kind, held in _HELD.items()}
 
 
-def columns(kind: type[Entry]) -> dict[str, Any]:
-    """Fields of a row with their types."""
-    return _COLUMNS[kind]
-
-
-def encode(entry: Entry) -> str:
-    """Content of a row's record.
+def content_of(entry: Entry) -> dict[str, Any]:
+    """Fields of a row that its record holds: those that are not as usual.
 
     Raises
     ------
     BadInput
         A value that the field cannot have.
     """
-    return encoded(content_of(entry))
-
-
-def content_of(entry: Entry) -> dict[str, Any]:
-    """Fields of a row that its record holds: those that are not as usual; errors as of :func:`encode`."""
-    kind = type(entry)
-    types = _HELD[kind]
-    values = zip(types, _USUAL[kind], _VALUES[kind](entry), strict=True)
-    data = {name: value for name, usual, value in values if value != usual}
-    plain = _PLAIN[kind]
+    kind, row = type(entry), vars(entry)
+    types, plain = _HELD[kind], _PLAIN[kind]
+    data = {name: row[name] for name, (_, usual) in types.items() if row[name] != usual}
     for name, value in data.items():
         if type(value) is not plain[name]:
             _checked(name, types[name][0], list(value) if isinstance(value, tuple) else value, kind)

@@ -22,45 +22,27 @@ from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.measure.csv_table import CsvTable
 from sensorgen.measure.log import entries, files
-from sensorgen.measure.log.entries import (
-    NAMES,
-    ROWS,
-    Calibration,
-    DesignRow,
-    Entry,
-    Print,
-    RawFile,
-    Reading,
-    Value,
-    Withdrawal,
-    from_cell,
-    from_json,
-    to_cell,
-)
+from sensorgen.measure.log.entries import ROWS, Entry, Print, RawFile, Reading, Value
 from sensorgen.measure.log.logbook import Log
 
 FORMATS = ("csv", "parquet")
-FILES = {kind: f"{NAMES[kind].replace('_', '-')}s".replace("batchs", "batches") for kind in ROWS}
-LATER = (Calibration, DesignRow, Withdrawal)  # kinds that exports of version 0.1.0 do not have
+FILES = {kind: f"{entries.NAMES[kind].replace('_', '-')}s".replace("batchs", "batches") for kind in ROWS}
+LATER = (entries.Calibration, entries.DesignRow, entries.Withdrawal)  # kinds that exports of version 0.1.0 do not have
 _LATER_COLUMNS: dict[type[Entry], tuple[str, ...]] = {  # that exports of earlier versions do not have
     Print: ("printed",),
     Reading: ("quantity", "value", "frequency_hz", "uncertainty", "wires", "temperature_c", "humidity_percent",
               "photo", "file", "defects"),
 }  # fmt: skip
-_COLUMNS = {kind: {k: v for k, v in entries.columns(kind).items() if k != "number"} for kind in ROWS}
-
-
-def columns(kind: type[Entry]) -> dict[str, Any]:
-    """Columns of an exported table with their types: all fields but the row's number in its own log."""
-    return _COLUMNS[kind]
+COLUMNS = {kind: {k: v for k, v in entries.COLUMNS[kind].items() if k != "number"} for kind in ROWS}
+"""Columns of each exported table with their types: all fields but the row's number in its own log."""
 
 
 def kind_of(names: Iterable[str]) -> type[Entry] | None:
     """Kind of row with exactly these columns, or None; those of later versions may be missing."""
     present = {*names, "claimed_at"}
     for kind in ROWS:
-        needed = columns(kind).keys() - _LATER_COLUMNS.get(kind, ())
-        if needed <= present <= columns(kind).keys():
+        needed = COLUMNS[kind].keys() - _LATER_COLUMNS.get(kind, ())
+        if needed <= present <= COLUMNS[kind].keys():
             return kind
     return None
 
@@ -125,7 +107,7 @@ def _write_table(log: Log, kind: type[Entry], path: Path, file_format: str) -> i
 
 def csv_lines(kind: type[Entry], rows: Iterable[Entry]) -> Iterator[str]:
     """Rows as CSV, the header first."""
-    wanted, target = columns(kind), io.StringIO(newline="")
+    wanted, target = COLUMNS[kind], io.StringIO(newline="")
     writer = csv.writer(target, lineterminator="\r\n")  # \n alone leaves a bare \r unquoted
     writer.writerow(wanted)
     yield target.getvalue()
@@ -133,13 +115,15 @@ def csv_lines(kind: type[Entry], rows: Iterable[Entry]) -> Iterator[str]:
         target.seek(0)
         target.truncate()
         cells = ((getattr(entry, name), annotation) for name, annotation in wanted.items())
-        writer.writerow([_text(value) if annotation is str else escaped(to_cell(value)) for value, annotation in cells])
+        writer.writerow([_cell(value, annotation) for value, annotation in cells])
         yield target.getvalue()
 
 
-def _text(words: str) -> str:
-    """Text as a cell; as JSON behind an apostrophe where it has characters that a terminal obeys."""
-    return spreadsheet(words) if harmless(words) == words else f"'{escaped(json.dumps(words, ensure_ascii=False))}"
+def _cell(value: Any, annotation: Any) -> str:
+    """A cell; text as JSON behind an apostrophe where it has characters that a terminal obeys."""
+    if annotation is not str:
+        return escaped(entries.to_cell(value))
+    return spreadsheet(value) if harmless(value) == value else f"'{escaped(json.dumps(value, ensure_ascii=False))}"
 
 
 def from_csv(kind: type[Entry], table: CsvTable) -> Iterator[Entry]:
@@ -154,17 +138,15 @@ def from_csv(kind: type[Entry], table: CsvTable) -> Iterator[Entry]:
     def convert(annotation: Any, cell: str) -> Value:
         if annotation is str:
             cell = json.loads(cell[1:]) if cell.startswith("'\"") else cell.removeprefix("'")
-        return from_cell(annotation, cell)
+        return entries.from_cell(annotation, cell)
 
     for number, cells in table.text_rows():
         values = dict(zip(table.names, cells, strict=True))
         yield _entry(kind, values, f"{table.name}, row {number}", convert)
 
 
-def _entry(
-    kind: type[Entry], values: Mapping[str, Any], where: str, convert: Callable[[Any, Any], Value]
-) -> Entry:  # fmt: skip
-    wanted, row = columns(kind), dict[str, Any]()
+def _entry(kind: type[Entry], values: Mapping[str, Any], where: str, convert: Callable[[Any, Any], Value]) -> Entry:
+    wanted, row = COLUMNS[kind], dict[str, Any]()
     for name, value in values.items():
         try:
             row[name] = convert(wanted[name], value)
@@ -189,7 +171,7 @@ def parquet(kind: type[Entry], rows: list[Entry]) -> bytes:
     }  # fmt: skip
     arrays = {
         name: pyarrow.array([getattr(row, name) for row in rows], types[annotation])
-        for name, annotation in columns(kind).items()
+        for name, annotation in COLUMNS[kind].items()
     }
     sink = io.BytesIO()
     pyarrow.parquet.write_table(pyarrow.table(arrays), sink)
@@ -215,7 +197,7 @@ def from_parquet(path: Path) -> tuple[type[Entry], list[Entry]]:
     if kind is None:
         raise BadInput(f"{str(path)!r}: columns {shown(table.column_names)}; expected those of the export of a log")
 
-    return kind, [_entry(kind, row, f"{path}, row {k}", from_json) for k, row in enumerate(rows, 1)]
+    return kind, [_entry(kind, row, f"{path}, row {k}", entries.from_json) for k, row in enumerate(rows, 1)]
 
 
 def _pyarrow() -> Any:

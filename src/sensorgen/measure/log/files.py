@@ -75,7 +75,7 @@ def keep(folder: Path, path: Path, known: RawFile | None = None) -> RawFile:
         remove_stale_parts(target.parent)
         shutil.copyfileobj(source, copy)
         copy.flush()
-        if _digest(Path(copy.name)) != row.uid:
+        if digest(Path(copy.name)) != row.uid:
             raise BadInput(f"{str(path)!r} {'is not the file of that SHA-256' if known else CHANGED}")
         Path(copy.name).chmod(0o444)
     for changed in (target.parent, folder, folder.parent):  # each may be new
@@ -94,7 +94,7 @@ def raw_file(path: Path) -> RawFile:
     with reading(path):
         if path.exists() and not path.is_file():
             raise BadInput(f"{str(path)!r} is no file; expected a recording")
-        return RawFile(uid=_digest(path), name=path.name, size=path.stat().st_size)
+        return RawFile(uid=digest(path), name=path.name, size=path.stat().st_size)
 
 
 def faults(folder: Path, files: Iterator[RawFile]) -> Iterator[str]:
@@ -104,12 +104,13 @@ def faults(folder: Path, files: Iterator[RawFile]) -> Iterator[str]:
         try:
             if path.is_symlink() or (path.exists() and not path.is_file()):
                 yield f"raw file {file.name} ({path}) is a link or no file; expected the file itself"
-            elif _digest(path) != file.uid:
+            elif digest(path) != file.uid:
                 yield f"raw file {file.name} ({path}) is not what was logged"
         except OSError as error:
             yield f"raw file {file.name} ({path}): {error.strerror or error}"
 
 
-def _digest(path: Path) -> str:
+def digest(path: Path) -> str:
+    """SHA-256 of a file."""
     with path.open("rb") as file:
         return file_digest(file, "sha256").hexdigest()

@@ -268,11 +268,11 @@ def lcr_export(
     table = lcr.read(path)
     of = notes.reading(specimen, remark=remark, baked=baked, source=path.name, log=log)
     raw_file = files.keep(log.files, path)
-    meter = next((name for name in accuracy.names() if accuracy.is_named(name, table.preamble)), "")
+    meter = accuracy.find(table.preamble)
     row = replace(
         notes.with_readings(replace(of, doubts=(*of.doubts, *table.doubts)), table.readings, _MOST_DOUBTS),
         uid=sha256(f"{of.specimen} {raw_file.uid}".encode()).hexdigest()[:32], file=raw_file.uid,
-        instrument=instrument or meter,
+        instrument=instrument or (meter.name if meter else ""),
     )  # fmt: skip
     new = [row for row in log.add([raw_file, row]) if isinstance(row, Reading)]
     return ImportedRecording(

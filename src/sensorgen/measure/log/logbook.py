@@ -15,7 +15,9 @@ from sensorgen.core import files as store
 from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, UnknownName, within
 from sensorgen.measure.log import chain, database, files
 from sensorgen.measure.log.chain import Record
+from sensorgen.measure.log.database import Appender
 from sensorgen.measure.log.entries import (
+    COLUMNS,
     INDEXED,
     KINDS,
     NAMES,
@@ -35,12 +37,7 @@ from sensorgen.measure.log.entries import (
     Specimen,
     Value,
     Withdrawal,
-    columns,
-    content_of,
     decode,
-    encode,
-    encoded,
-    index,
     indexed,
     word,
 )
@@ -99,6 +96,7 @@ class Log:
     def __init__(self, path: Path, *, create: bool = False) -> None:
         self.path = path = Path(path)
         self._connection = database.connect(path, create=create)
+        self._printed: dict[str, dict[str, Any]] = {}  # batch and design of the latest print, while rows are added
 
     def __enter__(self) -> Self:
         return self
@@ -132,15 +130,11 @@ class Log:
         rows = [self._row(kind, content, 0, "") for kind, content in self._rows(sql, values)]
         return tuple(Specimen(**{name: getattr(row, name) for name in SPECIMEN_COLUMNS}) for row in rows)
 
-    def readings(
-        self, *, last: int | None = None, superseded: bool = False, **equal: Value
-    ) -> tuple[Reading, ...]:  # fmt: skip
+    def readings(self, *, last: int | None = None, superseded: bool = False, **equal: Value) -> tuple[Reading, ...]:
         """Readings of the multimeter, the earliest first; parameters as :meth:`entries`."""
         return tuple(self.entries(Reading, last=last, superseded=superseded, replaced=False, **equal))
 
-    def recordings(
-        self, *, last: int | None = None, superseded: bool = False, **equal: Value
-    ) -> tuple[BenchRun, ...]:  # fmt: skip
+    def recordings(self, *, last: int | None = None, superseded: bool = False, **equal: Value) -> tuple[BenchRun, ...]:
         """Recordings of the bench, the earliest first; parameters as :meth:`entries`."""
         return tuple(self.entries(BenchRun, last=last, superseded=superseded, replaced=False, **equal))
 
@@ -187,15 +181,15 @@ class Log:
         BadInput
             The log is damaged; rows given before are sound.
         """
-        if strange := equal.keys() - columns(kind).keys():
-            raise UnknownName(f"column of a {kind.__name__}", min(strange), columns(kind))
+        if strange := equal.keys() - COLUMNS[kind].keys():
+            raise UnknownName(f"column of a {kind.__name__}", min(strange), COLUMNS[kind])
         asked = {name: equal[name] for name in (*INDEXED, "number") if equal.get(name) not in ("", None)}
         where = " AND ".join((*(f"{name} = ?" for name in asked), _current(superseded=superseded, replaced=replaced)))
         sql = (
             "SELECT kind, content, number, logged_at FROM record "  # noqa: S608
             f"WHERE kind = ?1 AND number IS NOT NULL AND {where} ORDER BY number {'DESC' if last else ''}"
         )
-        rows = (self._row(*row) for row in self._rows(sql, [NAMES[kind], *asked.values()]))
+        rows = itertools.starmap(self._row, self._rows(sql, [NAMES[kind], *asked.values()]))
         wanted = (row for row in rows if all(getattr(row, name) == value for name, value in equal.items()))
         yield from reversed(list(itertools.islice(wanted, last))) if last else wanted
 
@@ -252,11 +246,6 @@ class Log:
         """Records as they lie in the file: each with its numbers among all and its kind, and the index's fields."""
         sql = f"SELECT {_FIELDS}, sequence, number, {', '.join(INDEXED)} FROM record ORDER BY sequence"  # noqa: S608
         return ((_record(row[:6]), row[6], row[7], row[8:]) for row in self._rows(sql))
-
-    def known(self, key: str, before: int = 2**62) -> bool:
-        """Test whether the log has a record with that identity, before a number."""
-        sql = "SELECT 1 FROM record WHERE id = ? AND sequence < ?"
-        return next(self._rows(sql, [key, before]), None) is not None
 
     def merged_after(self, sequence: int) -> bool:
         """Test whether a merge follows a record, as it does where another machine's log begins."""
@@ -356,7 +345,8 @@ class Log:
         """
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         with database.transaction(self._connection, self.path):
-            writer = _Appender(self._connection, *self.head())
+            writer = Appender(self._connection, *self.head())
+            self._printed.clear()
             for entry in entries:
                 if added := self._add(entry, now, writer):
                     yield added
@@ -374,19 +364,17 @@ class Log:
         """
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         with database.transaction(self._connection, self.path):
-            writer = _Appender(self._connection, *self.head())
+            writer = Appender(self._connection, *self.head())
             merging = Merging(self, writer)
             yield merging
             if merging.added:
                 if len(merging.heads) > 1:
-                    content = encode(Merge(uid=""))
-                    writer.append(chain.made(list(merging.heads), NAMES[Merge], 1, now, content), indexed(content))
+                    writer.add(Merge(uid=""), now, list(merging.heads))
                 writer.finish()
 
     def sequence(self, key: str) -> int:
         """Number of the record with that identity; 0 if the log does not have it."""
-        row = self._connection.execute("SELECT sequence FROM record WHERE id = ?", [key]).fetchone()
-        return row[0] if row else 0
+        return int(next(self._rows("SELECT sequence FROM record WHERE id = ?", [key]), (0,))[0])
 
     def received(self, record: Record) -> Entry:
         """Row of another machine's record; parameters and errors as :meth:`merging`."""
@@ -400,33 +388,28 @@ class Log:
     def has(self, entry: Entry) -> bool:
         """Test whether the log has a row already, apart from what each machine adds to it."""
         kind, uid = type(entry), entry.uid
-        return self._exists(kind, uid) and any(_same(entry, row, but=_LOCAL) for row in self._of_uid(kind, uid))
+        rows = self.entries(kind, superseded=True, uid=uid) if self._exists(kind, uid) else ()
+        return any(_same(entry, row, but=_LOCAL) for row in rows)
 
     def _exists(self, kind: type[Entry], uid: str) -> bool:
         sql = "SELECT 1 FROM record WHERE kind = ? AND uid = ? AND number IS NOT NULL"
         return bool(uid) and self._connection.execute(sql, [NAMES[kind], uid]).fetchone() is not None
 
-    def _of_uid(self, kind: type[_Kind], uid: str) -> Iterator[_Kind]:
-        """Rows of a kind with a ``uid``, corrected or not."""
-        sql = "SELECT kind, content, number, logged_at FROM record WHERE kind = ? AND uid = ? AND number IS NOT NULL"
-        return (self._row(*row) for row in (self._rows(sql, [NAMES[kind], uid]) if uid else ()))
-
-    def _add(self, entry: Entry, now: str, writer: "_Appender") -> Entry | None:
+    def _add(self, entry: Entry, now: str, writer: Appender) -> Entry | None:
         kind = type(entry)
         if self._exists(kind, entry.uid):
-            known = next(self._of_uid(kind, entry.uid))
+            known = next(self.entries(kind, superseded=True, uid=entry.uid))
             if entry.logged_at and not _same(known, entry, but=("number", "logged_at", "claimed_at")):
                 raise BadInput(f"row {entry.uid} has other content in the log; expected the same")
             return None
         self._check(entry)
         if isinstance(entry, Reading | BenchRun) and not (entry.batch or entry.logged_at):
-            entry = self._with_print(entry, writer)
+            entry = self._with_print(entry)
+        if isinstance(entry, Batch | Print | Withdrawal):
+            self._printed.clear()
         if entry.logged_at and not entry.claimed_at:
             entry = dataclasses.replace(entry, claimed_at=entry.logged_at)
-        version = VERSIONS.get(NAMES[kind], 1)
-        content = content_of(entry)
-        record = chain.made([writer.head] if writer.head else [], NAMES[kind], version, now, encoded(content))
-        return entry.numbered(writer.append(record, index(content)), now)
+        return entry.numbered(writer.add(entry, now), now)
 
     def _check(self, entry: Entry) -> None:
         """Refuse a row that refers to none, corrects none, cannot be read later, or gives a name a second design."""
@@ -435,8 +418,11 @@ class Log:
             if uid and not self._exists(kind, uid):
                 raise BadInput(f"a {word(type(entry))} refers to {word(kind)} {uid!r:.80}, which the log does not have")
         self._check_correction(entry)
-        if isinstance(entry, Prediction):
-            _check_prediction(entry)
+        if isinstance(entry, Prediction):  # which a report has to read later
+            from sensorgen.prediction.results import from_json
+
+            with within(f"prediction of {entry.design!r:.60}"):
+                from_json(entry.data)
         if isinstance(entry, Print) and not entry.logged_at:
             before = self.bound(entry.specimen)
             if before and before.design_id != entry.design_id:
@@ -448,7 +434,7 @@ class Log:
         if not uid:
             return
         kind = KINDS.get(entry.of, type(entry)) if isinstance(entry, Withdrawal) else type(entry)
-        old = next(self._of_uid(kind, uid), None)
+        old = next(self.entries(kind, superseded=True, uid=uid), None)
         if old is None:
             raise BadInput(f"nothing to correct: no row {uid!r} in the log")
         later = next(iter(self.superseding(old)), None)
@@ -493,15 +479,16 @@ class Log:
         """Test whether a row, or its last correction, is withdrawn."""
         return any(isinstance(later, Withdrawal) or self._withdrawn(later) for later in self.superseding(entry))
 
-    def _with_print(self, entry: Reading | BenchRun, writer: "_Appender") -> Reading | BenchRun:
+    def _with_print(self, entry: Reading | BenchRun) -> Reading | BenchRun:
         """Entry with batch and design of the specimen's latest print."""
-        if entry.specimen not in writer.printed:
+        if entry.specimen not in self._printed:
             printed, changes = self.bound(entry.specimen), dict[str, Any]()
             if printed:
-                batch = next((row.batch for row in self._of_uid(Batch, printed.batch_uid)), "")
+                batches = self.entries(Batch, superseded=True, uid=printed.batch_uid) if printed.batch_uid else ()
+                batch = next((row.batch for row in batches), "")
                 changes = {"batch": batch, "design_id": printed.design_id, "design": printed.design}
-            writer.printed[entry.specimen] = changes
-        return dataclasses.replace(entry, **changes) if (changes := writer.printed[entry.specimen]) else entry
+            self._printed[entry.specimen] = changes
+        return dataclasses.replace(entry, **changes) if (changes := self._printed[entry.specimen]) else entry
 
     def bound(self, specimen: str) -> Print | None:
         """The latest print of a specimen, which binds its name to a design; None of a name that is not bound.
@@ -543,9 +530,9 @@ class Merging:
         At the number of each record that was offered and that the log has now: 1.
     """
 
-    def __init__(self, log: Log, writer: "_Appender") -> None:
+    def __init__(self, log: Log, writer: Appender) -> None:
         self._log, self._writer = log, writer
-        self.added, self.heads = 0, dict.fromkeys([writer.head] if writer.head else [])
+        self.added, self.heads = 0, dict.fromkeys(writer.heads)
         self.offered = bytearray(writer.sequence + 1)
 
     def take(self, record: Record) -> str:
@@ -573,36 +560,6 @@ class Merging:
         return ""
 
 
-class _Appender:
-    """Appends records within a transaction, each with its number among those of its kind."""
-
-    def __init__(self, connection: Any, sequence: int, head: str) -> None:
-        self._connection = connection
-        self.sequence, self.head = sequence, head
-        self._numbers: dict[str, int] = {}
-        self.printed: dict[str, dict[str, Any]] = {}  # batch and design of the latest print, by specimen
-
-    def append(self, record: Record, index: Iterable[str | int | None], *, copy: bool = False) -> int:
-        """Append a record with its entries of the index; a copy of a row that the log has gets no number of its own."""
-        if record.kind not in self._numbers:
-            sql = "SELECT max(number) FROM record WHERE kind = ?"
-            self._numbers[record.kind] = self._connection.execute(sql, [record.kind]).fetchone()[0] or 0
-        if record.kind in (NAMES[Batch], NAMES[Print], NAMES[Withdrawal]):
-            self.printed.clear()
-        self._numbers[record.kind] += not copy
-        number = None if copy else self._numbers[record.kind]
-        self.sequence, self.head = self.sequence + 1, record.id
-        database.insert(self._connection, record, self.sequence, number, index)
-        return number or 0
-
-    def finish(self) -> None:
-        """Note the last record apart, so that rows missing at the end are noticed."""
-        if self._numbers:
-            sql = "INSERT INTO head VALUES (1, ?, ?) ON CONFLICT DO UPDATE SET sequence = excluded.sequence, " \
-                  "id = excluded.id"  # fmt: skip
-            self._connection.execute(sql, [self.sequence, self.head])
-
-
 def _current(*, superseded: bool, replaced: bool = False) -> str:
     """Condition on rows: those that no later row corrects or withdraws, all, or those that one does alone."""
     if replaced:
@@ -626,16 +583,8 @@ def _two_designs(one: Print, other: Print) -> str:
 def _same(one: Entry, other: Entry, but: tuple[str, ...]) -> bool:
     """Test whether two rows of a kind have the same content, apart from some fields."""
     return type(one) is type(other) and all(
-        getattr(one, name) == getattr(other, name) for name in columns(type(one)) if name not in but
+        getattr(one, name) == getattr(other, name) for name in COLUMNS[type(one)] if name not in but
     )
-
-
-def _check_prediction(entry: Prediction) -> None:
-    """Refuse what no report could read later."""
-    from sensorgen.prediction.results import from_json
-
-    with within(f"prediction of {entry.design!r:.60}"):
-        from_json(entry.data)
 
 
 def _record(row: Sequence[Any]) -> Record:

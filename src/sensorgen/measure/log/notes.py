@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from decimal import Decimal
 from functools import lru_cache
 from itertools import chain
-from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.core.records import shown
@@ -19,10 +18,7 @@ from sensorgen.design.design import Design
 from sensorgen.measure import immittance
 from sensorgen.measure.immittance import NUMBER, decimal
 from sensorgen.measure.log.entries import SPECIMEN_COLUMNS, Print, Reading, Specimen
-
-if TYPE_CHECKING:
-    from sensorgen.measure.log.logbook import Log
-
+from sensorgen.measure.log.logbook import Log
 
 OVERLOAD = math.inf  # beyond the meter's range [ohm]
 SCPI_OVERLOAD_OHM = 9.9e37  # SCPI 1999, 7.2.1.4: what an instrument sends for infinity
@@ -138,7 +134,7 @@ FIRST_WITH_FILMS = 22  # iteration from which on the thesis writes films into na
 _UNBAKED = re.compile(r"\b(not|un|never)[\s-]*baked\b|\bbefore (the )?bak(e|ing)\b", re.IGNORECASE)
 
 
-def specimen(written: str, log: "Log | None" = None) -> Specimen:
+def specimen(written: str, log: Log | None = None) -> Specimen:
     """Specimen by its name.
 
     Parameters
@@ -162,14 +158,14 @@ def specimen(written: str, log: "Log | None" = None) -> Specimen:
         raise BadInput(f"{error}; or bind it to its design: sensorgen log specimen NAME --design FILE") from None
 
 
-def _bound(written: str, log: "Log | None") -> Print | None:
+def _bound(written: str, log: Log | None) -> Print | None:
     return log.bound(" ".join(written.split())) if log else None
 
 
 def reading(
     written: str, y_words: str = "", z_words: str = "", *, remark: str = "", baked: bool | None = None,
     measured_at: str = "", instrument: str = "", source: str = "typed", source_row: int | None = None,
-    supersedes: str = "", uid: str = "", table: bool = False, mega: bool = False, log: "Log | None" = None,
+    supersedes: str = "", uid: str = "", table: bool = False, mega: bool = False, log: Log | None = None,
 ) -> Reading:  # fmt: skip
     """Reading of the multimeter, from text.
 
@@ -290,13 +286,13 @@ def resistance(axis: str, text: str, *, mega: bool = False) -> Resistances:
     BadInput
         Not a resistance; the message names the axis.
     """
-    try:
+    try:  # of a hundred thousand cells: a context manager would take longer than they
         return parse(text, mega=mega)
     except BadInput as error:
         raise error.within(f"resistance in {axis.upper()}") from None
 
 
-def design_fields(written: str, log: "Log | None" = None) -> tuple[str, str]:
+def design_fields(written: str, log: Log | None = None) -> tuple[str, str]:
     """Identity and name of the design that a specimen's name is bound to or stands for; "" where there is none."""
     bound = _bound(written, log)
     if bound:

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import Field
 
@@ -22,10 +22,6 @@ from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import notes
 from sensorgen.measure.log.entries import Batch, BenchRun, DesignRow, Entry, Prediction, Print, RawFile, Reading
 from sensorgen.measure.log.logbook import Log
-
-if TYPE_CHECKING:
-    from sensorgen.measure.log.logbook import Log
-
 
 MOST_BYTES = 64_000_000
 
@@ -101,7 +97,7 @@ def _piece(batch: str, name: str, piece: _Piece, record: _Record) -> Iterator[En
         yield prediction(piece.design_id, piece.design, piece.expected | ({"printed": printed} if printed else {}))
 
 
-def designs(log: "Log", refused: dict[str, str] | None = None) -> dict[str, Design]:
+def designs(log: Log, refused: dict[str, str] | None = None) -> dict[str, Design]:
     """Designs in the log by their identity when they were logged; without those that cannot be read here.
 
     Of those whose shape the user has not trusted, ``refused`` gets the reason.
@@ -199,9 +195,7 @@ def bind(
     return [row for row in new if isinstance(row, Print)]
 
 
-def _prints(
-    log: Log, names: Sequence[str], of: Design, on_bed: Print | None, iteration: int | None
-) -> Iterator[Print]:  # fmt: skip
+def _prints(log: Log, names: Sequence[str], of: Design, on_bed: Print | None, iteration: int | None) -> Iterator[Print]:
     """Row of each name that is not bound to a design yet, or to the print on its bed."""
     design_id = on_bed.design_id if on_bed else of.id()
     film_mm = getattr(of.params, "dielectric_mm", None)
@@ -244,8 +238,7 @@ def _design(log: Log, design: str) -> Design:
 
 
 def _logged(log: Log, design_id: str) -> Design:
-    design = designs(log).get(design_id)
-    if design is None:
+    if (design := designs(log).get(design_id)) is None:
         raise MissingValue(f"the log has design {design_id} by its identity alone; give its file: --design FILE")
     return design
 

@@ -14,7 +14,7 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from hashlib import file_digest, sha256
+from hashlib import sha256
 from pathlib import Path
 
 from sensorgen.core import files as store
@@ -185,11 +185,7 @@ def _pull(log: Log, folder: Path, notes: list[str]) -> tuple[int, bytearray]:
 def _whole(log: Log, folder: Path, notes: list[str]) -> Iterator[Path]:
     """Files of records that are what their names say, and no links; the raw files that they tell of are kept."""
     for path in sorted((folder / "records").glob("*.jsonl")):
-        whole = not path.is_symlink() and path.is_file()
-        if whole:
-            with path.open("rb") as file:
-                whole = file_digest(file, "sha256").hexdigest() == path.stem
-        if not whole:
+        if path.is_symlink() or not path.is_file() or files.digest(path) != path.stem:
             wrong = "is a link" if path.is_symlink() else "is incomplete or was changed"
             notes.append(f"{path.name:.20} {wrong}, and was left out")
             continue

@@ -194,7 +194,7 @@ def _follows(log: Log, record: chain.Record, sequence: int, before: str) -> bool
     """Test whether all that a record follows is there; another machine's log may begin anywhere before a merge."""
     if not record.parents:
         return not before or log.merged_after(sequence)
-    return all(parent == before or log.known(parent, sequence) for parent in record.parents)
+    return all(parent == before or 0 < log.sequence(parent) < sequence for parent in record.parents)
 
 
 def _missing(log: Log, kind: type[Entry], name: str, other: type[Entry]) -> Iterator[str]:
@@ -210,7 +210,7 @@ def _anchor_faults(log: Log, path: Path, notes: list[str]) -> Iterator[str]:
         heads = _ANCHORED.findall(path.read_text("utf-8", "replace"))
     if not heads:
         raise BadInput(f"{str(path)!r} has no head of a log; expected a text as sensorgen log anchor writes it")
-    missing = [head for head in heads if not log.known(head)]
+    missing = [head for head in heads if not log.sequence(head)]
     if missing:
         yield f"{len(missing)} of {len(heads)} heads in {str(path)!r} are not in the log: {missing[0][:12]}..."
     else:

@@ -1,8 +1,7 @@
 """Recordings of the bench: instrument files, their clocks and marks, and the rig's log joined with them."""
 
 from sensorgen.measure.recording.files import parts, read, read_all
-from sensorgen.measure.recording.join import Joined, joined, joined_all
-from sensorgen.measure.recording.rig import RigLog, rig
+from sensorgen.measure.recording.rig import Joined, RigLog, joined, joined_all, rig
 from sensorgen.measure.recording.samples import MARKS, Recording, RecordingClock, Source
 
 __all__ = [

@@ -7,22 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, within
+from sensorgen.core.files import reading
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording import samples
-from sensorgen.measure.recording.samples import (
-    MOST_TONES,
-    MOST_VALUES,
-    Complex,
-    Real,
-    Recording,
-    Source,
-    at_pauses,
-    blank,
-    numbered,
-    rate_hz,
-    sifted,
-)
+from sensorgen.measure.recording.samples import MOST_TONES, MOST_VALUES, Recording, Source
 from sensorgen.measure.recording.spool import MOST_BYTES, FileSpool
 
 if TYPE_CHECKING:
@@ -70,15 +60,12 @@ def _stretch(path: Path, file: "Readings", blocks: list[tuple[Complex, Real]]) -
     impedance = np.concatenate([z for z, _ in blocks])
     beside = dict(zip(file.numbers, np.concatenate([numbers for _, numbers in blocks]).T, strict=True))
     blocks.clear()
+    marks = {"clipped": beside[CLIPPED] == 1} if CLIPPED in beside else {}
+    marks |= {"invalid": beside[VALID] != 1} if VALID in beside else {}
     with within(str(path)):
-        rebuilt = samples.rebuilt(len(impedance), beside.get(TIME), beside.get(STAMP))
-    marks = blank(len(impedance)) | rebuilt.marks | sifted(impedance)
-    if CLIPPED in beside:
-        marks["clipped"] = beside[CLIPPED] == 1
-    if VALID in beside:
-        marks["invalid"] = beside[VALID] != 1
-    source = Source(path.name, "CSV", rate_hz=rate_hz(rebuilt.time_s), notes=rebuilt.notes)
-    return Recording(rebuilt.time_s, file.frequency_hz, impedance, marks, rebuilt.clock, source)
+        return Recording.rebuilt(
+            impedance, file.frequency_hz, beside.get(TIME), beside.get(STAMP), Source(path.name, "CSV"), **marks
+        )
 
 
 _HDF = b"\x89HDF\r\n\x1a\n"
@@ -142,10 +129,8 @@ def parts(path: Path | str, columns: Mapping[str, str] | None = None) -> Iterato
         file_format = "MATLAB 7.3" if matlab else "HDF5"
     spool = FileSpool()
     stretches = recordings(path, columns or {}) if file_format == "CSV" else _stretches(path, file_format, spool)
-    try:
-        yield from numbered(_relieved(path, stretches, spool))
-    except OSError as error:
-        raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
+    with reading(path):
+        yield from samples.numbered(_relieved(path, stretches, spool))
 
 
 def _stretches(path: Path, file_format: str, spool: FileSpool) -> Iterator[tuple[Recording, ...]]:
@@ -165,7 +150,7 @@ def _relieved(
     for stretch in stretches:
         spool.relieve()
         with within(str(path)):
-            cut = at_pauses(stretch)
+            cut = samples.at_pauses(stretch)
         del stretch
         while cut:
             yield cut.pop(0)

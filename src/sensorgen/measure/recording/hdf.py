@@ -110,7 +110,7 @@ class _Reader:
     def _struct(self, group: Any, depth: int) -> list[dict[str, Any]]:
         """Struct; an array of structs is a group whose fields are lists of references without a class."""
         fields = {name: self.member(group, name, depth + 1) for name in group}
-        members = [group[name] for name in group]
+        members = list(group.values())
         if members and all(self._refers(item) and _CLASS not in item.attrs for item in members):
             count = min(map(len, fields.values()))
             return [{name: values[i] for name, values in fields.items()} for i in range(count)]
@@ -119,8 +119,7 @@ class _Reader:
     def _array(self, item: Any) -> Any:
         if self._is_complex(item.dtype):
             raw = self._numbers(item)
-            real, imag = (raw[n] for n in sorted(item.dtype.names, key=str.lower, reverse=True))
-            return Split(real.T, imag.T) if _CLASS in item.attrs else Split(real, imag)
+            return Split(*(_turned(item, raw[n]) for n in sorted(item.dtype.names, key=str.lower, reverse=True)))
         if self._h5.check_string_dtype(item.dtype):
             if item.size != 1 or item.dtype.itemsize > _MOST_TEXT:
                 raise BadInput(f"{item.name}: {item.size} texts; expected one text, or numbers")
@@ -132,7 +131,7 @@ class _Reader:
             if values.nbytes > _MOST_TEXT:
                 raise BadInput(f"{item.name}: a text of {values.nbytes} bytes; expected up to {_MOST_TEXT}")
             return characters(values.ravel())
-        return values.T if _CLASS in item.attrs else values
+        return _turned(item, values)
 
     @staticmethod
     def _is_complex(kind: np.dtype[Any]) -> bool:
@@ -149,6 +148,11 @@ class _Reader:
             return np.empty(item.shape, item.dtype)
         content = self._spool.held(np.ascontiguousarray(item[at]).tobytes() for at in _places(item))
         return np.frombuffer(content, item.dtype).reshape(item.shape)
+
+
+def _turned(item: Any, values: NDArray[Any]) -> NDArray[Any]:
+    """Numbers with MATLAB's rows as rows."""
+    return values.T if _CLASS in item.attrs else values
 
 
 def _attribute(group: Any, name: str) -> Any:

@@ -9,17 +9,14 @@ with them; where they go back for good, the computer's clock was set, and the ti
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Bools = NDArray[np.bool_]
 
 MARKS = {
     "zero": "a tone is exactly 0 + 0j: the instrument skipped a block",
@@ -46,12 +43,12 @@ _FASTEST_HZ = 1e12  # beyond it a step is no step
 _LARGEST_OHM = 1e30  # beyond it arithmetic fails before physics does
 
 
-def blank(count: int) -> dict[str, Bools]:
+def blank(count: int) -> dict[str, Mask]:
     """Marks without any sample marked."""
     return {name: np.zeros(count, bool) for name in MARKS}
 
 
-def sifted(impedance_ohm: Complex) -> dict[str, Bools]:
+def sifted(impedance_ohm: Complex) -> dict[str, Mask]:
     """Marks of exact zeros and of numbers that are not finite; both are replaced by nan in place [ohm]."""
     zero = impedance_ohm == 0
     with np.errstate(over="ignore"):
@@ -147,9 +144,21 @@ class Recording:
     time_s: Real
     tones_hz: Real
     impedance_ohm: Complex
-    marks: Mapping[str, Bools]
+    marks: Mapping[str, Mask]
     clock: RecordingClock
     source: Source = field(default=Source("", ""))
+
+    @classmethod
+    def rebuilt(
+        cls, impedance_ohm: Complex, tones_hz: Real, time_s: Real | None, stamp_s: Real | None, source: Source,
+        **marks: Mask,
+    ) -> Self:  # fmt: skip
+        """Recording with the clock of :func:`rebuilt`; impedances of 0 and those that are no numbers become nan."""
+        count = len(impedance_ohm)
+        by = rebuilt(count, time_s, stamp_s)
+        source = replace(source, rate_hz=rate_hz(by.time_s), notes=source.notes + by.notes)
+        every = blank(count) | by.marks | sifted(impedance_ohm) | marks
+        return cls(by.time_s, tones_hz, impedance_ohm, every, by.clock, source)
 
     @property
     def epoch_s(self) -> float:
@@ -165,7 +174,7 @@ class Recording:
         marked = {name: int(np.count_nonzero(which)) for name, which in self.marks.items()}
         return {"samples": len(self.time_s), "valid": int(np.count_nonzero(self.valid()))} | marked
 
-    def valid(self) -> Bools:
+    def valid(self) -> Mask:
         """Samples without any mark but the harmless ones."""
         valid = np.ones(len(self.time_s), bool)
         for name, which in self.marks.items():
@@ -219,15 +228,11 @@ def at_pauses(recordings: tuple[Recording, ...]) -> list[tuple[Recording, ...]]:
 
 def numbered(parts: Iterable[tuple[Recording, ...]]) -> Iterator[tuple[Recording, ...]]:
     """Parts of a file with their numbers, and with a remark where they begin; the only one has none."""
-    number, ended = 0, 0.0
-    following = iter(parts)
-    now = next(following, None)
-    while now is not None:
-        then = next(following, None)
-        number += 1
+    ended = 0.0
+    for number, (now, then) in enumerate(pairwise(chain(parts, [()])), 1):
         of = number if then or number > 1 else 0
         yield tuple(replace(one, source=_source(one, of, ended)) for one in now)
-        ended, now = float(now[0].time_s[-1]), then
+        ended = float(now[0].time_s[-1])
 
 
 def _source(one: Recording, part: int, ended_s: float) -> Source:
@@ -272,7 +277,7 @@ class Rebuilt:
 
     time_s: Real
     clock: RecordingClock
-    marks: dict[str, Bools]
+    marks: dict[str, Mask]
     notes: tuple[str, ...]
 
 

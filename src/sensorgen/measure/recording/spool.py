@@ -3,9 +3,9 @@
 import mmap
 import os
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, takewhile
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput
@@ -55,7 +55,8 @@ class FileSpool:
             if block is None:
                 return memoryview(b"".join(first))
             first.append(block)
-        with tempfile.TemporaryFile(dir=_folder()) as file:
+        beside = None if os.environ.get("TMPDIR") or not Path("/var/tmp").is_dir() else "/var/tmp"  # noqa: S108
+        with tempfile.TemporaryFile(dir=beside) as file:
             for block in chain(first, rest):
                 file.write(block)
             file.flush()
@@ -65,22 +66,12 @@ class FileSpool:
 
     def file(self, path: Path) -> memoryview:
         """A file's content: a copy, so that a file that is cut off meanwhile does no harm."""
-        return self.held(_blocks(path))
+        with path.open("rb") as file:
+            pieces = (file.read(min(_BLOCK, MOST_BYTES - at)) for at in range(0, MOST_BYTES, _BLOCK))
+            return self.held(takewhile(bool, pieces))
 
     def relieve(self) -> None:
         """Give the memory back that was taken to read the arrays; they stay readable."""
         for mapped in self._maps:
             if hasattr(mmap, "MADV_DONTNEED"):
                 mapped.madvise(mmap.MADV_DONTNEED)
-
-
-def _folder() -> str | None:
-    return None if os.environ.get("TMPDIR") or not Path("/var/tmp").is_dir() else "/var/tmp"  # noqa: S108
-
-
-def _blocks(path: Path) -> Iterator[bytes]:
-    left = MOST_BYTES
-    with path.open("rb") as file:
-        while left > 0 and (block := file.read(min(_BLOCK, left))):
-            left -= len(block)
-            yield block

@@ -4,28 +4,20 @@ Whether a variable is a scalar, a vector, a cell or a struct array depends on th
 on the program that wrote the file, so that everything is flattened first.
 """
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from math import ceil
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.errors import BadInput, within
-from sensorgen.measure.recording import samples
 from sensorgen.measure.recording.matfive import Split
-from sensorgen.measure.recording.samples import (
-    MOST_TONES,
-    Bools,
-    Real,
-    Recording,
-    Source,
-    blank,
-    rate_hz,
-    sifted,
-    stretches,
-)
+from sensorgen.measure.recording.samples import MOST_TONES, Recording, Source, stretches
 
 WANTED = ("impedance_data", "impedance_time", "timestamps", "settings", "ref_offset", "sig_offset", "offset_time")
 _MARGIN = 0.99  # of a range, as in the program itself
@@ -34,6 +26,7 @@ _EXPECTED = "expected a recording of TiePieLCR: impedance_data with lockin1, imp
 
 _MOST_MEANS = 1 << 20  # of an input's means; of more, the largest of several
 
+_LOCKIN = re.compile(r"lockin[0-9]+")
 Tree = Mapping[str, Any]
 Vector = NDArray[Any]
 """Numbers of any type as they are in the file, outside memory."""
@@ -60,10 +53,10 @@ def recordings(tree: Tree, source: Source) -> Iterator[tuple[Recording, ...]]:
     settings = list(_structs(tree.get("settings")))
     if len(settings) != count:
         raise BadInput(f"settings: {len(settings)} structs for {count} lock-ins; expected one each")
-    stamps = _vector(tree["timestamps"], "timestamps") if "timestamps" in tree else None
+    stamps = [_vector(tree["timestamps"], "timestamps") if "timestamps" in tree else None]  # of the first alone
     given = [
-        _LockIn.of(tree, k, count, name, raw, own, time, stamps if k == 0 else None)  # only the first is stamped
-        for k, ((name, raw), own, time) in enumerate(zip(lockins.items(), settings, times, strict=True))
+        _LockIn.of(tree, k, count, name, raw, own, time, stamp)
+        for k, ((name, raw), own, time, stamp) in enumerate(zip_longest(lockins.items(), settings, times, stamps))
     ]
     for at in stretches(max(one.count for one in given), sum(len(one.tones_hz) for one in given)):
         results: list[Recording] = []
@@ -79,7 +72,7 @@ def _lockins(tree: Tree) -> dict[str, Any]:
     data = tree.get("impedance_data")
     if not isinstance(data, list) or len(data) != 1 or not isinstance(data[0], dict):
         raise BadInput(f"impedance_data is {_described(data)}; {_EXPECTED}")
-    names = [name for name in data[0] if name.startswith("lockin") and name[6:].isascii() and name[6:].isdigit()]
+    names = list(filter(_LOCKIN.fullmatch, data[0]))
     if not names:
         raise BadInput(f"impedance_data has the fields {', '.join(list(data[0])[:8]) or 'none'}; {_EXPECTED}")
     return {name: data[0][name] for name in sorted(names, key=lambda name: int(name[6:]))}
@@ -173,7 +166,7 @@ class _LockIn:
     count: int
     incomplete: int
     settings: Tree
-    clipping: Callable[[Real], Bools]
+    clipping: Callable[[Real], Mask]
 
     @classmethod
     def of(
@@ -190,9 +183,7 @@ class _LockIn:
         if min(lengths) == 0:
             raise BadInput(f"impedance_data.{name}: no samples")
         clipping = _clipping(tree, k, lockins, settings)
-        return cls(
-            name, tones, parts, time, stamps, min(lengths), max(lengths) - min(lengths), settings, clipping
-        )  # fmt: skip
+        return cls(name, tones, parts, time, stamps, min(lengths), max(lengths) - min(lengths), settings, clipping)
 
     def recording(self, at: slice, source: Source) -> Recording:
         """A stretch of it."""
@@ -203,19 +194,15 @@ class _LockIn:
         z = np.zeros((at.stop - at.start, len(self.tones_hz)), np.complex128)
         for half, part in zip((z.real, z.imag), self.parts, strict=False):
             half[:] = part[at]
-        with within(f"impedance_time of {self.name}"):
-            rebuilt = samples.rebuilt(len(z), time, stamps)
-        rate, bandwidth = rate_hz(rebuilt.time_s), _number(self.settings, "bandwidth")
-        marks = blank(len(z)) | rebuilt.marks | sifted(z) | {"clipped": self.clipping(np.asarray(time))}
-        if at.start == 0 and bandwidth > 0 and np.isfinite(rate):  # until the demodulator's filter has settled
-            marks["transient"][: ceil(min(_START_UP / bandwidth * rate, len(z)))] = True
-        version = self.settings.get("version")
+        version, bandwidth = self.settings.get("version"), _number(self.settings, "bandwidth")
         program = f"TiePieLCR {version[:40].strip()}" if isinstance(version, str) else "TiePieLCR"
-        source = replace(
-            source, lockin=int(self.name[6:]), program=program, bandwidth_hz=bandwidth, rate_hz=rate,
-            notes=notes + rebuilt.notes,
-        )  # fmt: skip
-        return Recording(rebuilt.time_s, self.tones_hz, z, marks, rebuilt.clock, source)
+        source = replace(source, lockin=int(self.name[6:]), program=program, bandwidth_hz=bandwidth, notes=notes)
+        with within(f"impedance_time of {self.name}"):
+            one = Recording.rebuilt(z, self.tones_hz, time, stamps, source, clipped=self.clipping(np.asarray(time)))
+        rate = one.source.rate_hz
+        if at.start == 0 and bandwidth > 0 and np.isfinite(rate):  # until the demodulator's filter has settled
+            one.marks["transient"][: ceil(min(_START_UP / bandwidth * rate, len(z)))] = True
+        return one
 
 
 def _matrix(raw: Any, name: str, tones: int) -> tuple[Vector, ...]:
@@ -233,7 +220,7 @@ def _matrix(raw: Any, name: str, tones: int) -> tuple[Vector, ...]:
     return tuple(part.reshape(shape) for part in ((raw.real, raw.imag) if raw.dtype.kind == "c" else (raw.real,)))
 
 
-def _clipping(tree: Tree, k: int, count: int, settings: Tree) -> Callable[[Real], Bools]:
+def _clipping(tree: Tree, k: int, count: int, settings: Tree) -> Callable[[Real], Mask]:
     """Times at which the mean of an input fills the input's range.
 
     The program detects clipping in its waveforms and displays it, but the file has only the means of the two inputs: a
@@ -255,7 +242,7 @@ def _clipping(tree: Tree, k: int, count: int, settings: Tree) -> Callable[[Real]
     curves = [(_largest(mean, each)[order], limit) for mean, limit in zip(means, limits, strict=True)
               if len(mean) == len(at) > 0]  # fmt: skip
 
-    def clipped(time_s: Real) -> Bools:
+    def clipped(time_s: Real) -> Mask:
         over = [np.interp(time_s, times[order], mean) >= _MARGIN * limit for mean, limit in curves]
         return np.asarray(np.any([np.zeros(len(time_s), bool), *over], axis=0))
 

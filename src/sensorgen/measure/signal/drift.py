@@ -22,9 +22,9 @@ from math import inf, log
 
 import numpy as np
 
+from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.measure.recording.rig import relaxation
-from sensorgen.measure.recording.samples import Bools, Complex, Real
 
 BIN_S = 0.25  # beyond the demodulator's own memory, so that bins are independent of each other
 _TAUS = 5
@@ -290,7 +290,7 @@ class Drift:
 
 
 def fitted(
-    time_s: Real, impedance_ohm: Complex, valid: Bools, force_n: Real, settle_s: float = SETTLE_S,
+    time_s: Real, impedance_ohm: Complex, valid: Mask, force_n: Real, settle_s: float = SETTLE_S,
     among: Collection[str] = tuple(LAWS),
 ) -> Drift:  # fmt: skip
     """Fit the drift to the rest between presses.
@@ -351,7 +351,7 @@ def check(law: str) -> None:
         raise UnknownName("law of drift", law, LAWS)
 
 
-def _disturbed(time_s: Real, force_n: Real, settle_s: float) -> Bools:
+def _disturbed(time_s: Real, force_n: Real, settle_s: float) -> Mask:
     """Samples under a press or just after one, or with an unknown force."""
     pressing = ~(np.abs(force_n) < 0.1)
     last = np.maximum.accumulate(np.where(pressing, time_s, -np.inf))

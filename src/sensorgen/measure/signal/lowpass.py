@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import OutOfRange
-from sensorgen.measure.recording.samples import Complex, Real, Recording
+from sensorgen.measure.recording.samples import Recording
 
 CUTOFF_HZ = 0.2727
 ORDER = 4

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.recording.rig import principal_component
-from sensorgen.measure.recording.samples import Bools, Complex, Real
 
 THRESHOLD_N = 0.2
 WINDOW_S, GUARD_S = 1.0, 0.3
@@ -88,7 +88,7 @@ def by_readings(time_s: Real, impedance_ohm: Complex) -> list[PressTimes]:
     return [PressTimes(float(time_s[i]), float(time_s[j])) for i, j in spans if time_s[j] - time_s[i] >= _SHORTEST_S]
 
 
-def _spans(on: Bools) -> list[tuple[int, int]]:
+def _spans(on: Mask) -> list[tuple[int, int]]:
     """First samples, and those after the last, of every span that is on."""
     edges = np.diff(np.concatenate([[False], on, [False]]).astype(int))
     return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
@@ -148,7 +148,7 @@ class Pairs:
 
 
 def pairs(
-    time_s: Real, impedance_ohm: Complex, valid: Bools, presses: list[PressTimes], force_n: Real, position_mm: Real,
+    time_s: Real, impedance_ohm: Complex, valid: Mask, presses: list[PressTimes], force_n: Real, position_mm: Real,
     window_s: float = WINDOW_S, guard_s: float = GUARD_S,
 ) -> Pairs:  # fmt: skip
     """Average the readings before and under each press.
@@ -229,7 +229,7 @@ def _known_mean(values: Real) -> float:
     return float(known.mean()) if len(known) else np.nan
 
 
-def _within(time_s: Real, valid: Bools, start_s: float, end_s: float) -> NDArray[np.intp]:
+def _within(time_s: Real, valid: Mask, start_s: float, end_s: float) -> NDArray[np.intp]:
     """Valid readings between two times."""
     first, after = np.searchsorted(time_s, start_s), np.searchsorted(time_s, end_s, side="right")
     return first + np.flatnonzero(valid[first:after])

@@ -6,11 +6,11 @@ from math import floor, hypot, isnan, log10, pi, sqrt
 
 import numpy as np
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.document import Cell, Column, Facts, Part, Table
 from sensorgen.core.units import frequency_text
 from sensorgen.measure.log import bench
 from sensorgen.measure.recording import RigLog
-from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.measure.signal.presses import Pairs
 from sensorgen.measure.signal.run import Hysteresis, Processed, Ways
 

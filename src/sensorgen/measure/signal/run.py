@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording.join import Joined, joined
-from sensorgen.measure.recording.rig import RigLog
-from sensorgen.measure.recording.samples import Complex, Real, Recording
+from sensorgen.measure.recording.rig import Joined, RigLog, joined
+from sensorgen.measure.recording.samples import Recording
 from sensorgen.measure.signal import drift, lowpass, presses
 from sensorgen.measure.signal.presses import THRESHOLD_N, by_force
 
@@ -91,7 +91,7 @@ def processed(
             notes.append(f"drift not removed: {error}")
     try:
         pairs = presses.pairs(one.time_s, z, valid, spans, force, position) if spans else None
-        notes += [f"left out: {press}" for press in pairs.left_out] if pairs else ["nothing pressed"]
+        notes += map("left out: {}".format, pairs.left_out) if pairs else ["nothing pressed"]
     except BadInput as error:
         notes.append(f"no presses: {error}")
     return Processed(one, force, *filtered, removed, pairs, rig is not None, tuple(notes))
@@ -104,7 +104,7 @@ def _beside(recording: Recording, rig: RigLog | Joined | None) -> tuple[Recordin
         unknown = np.full(len(recording.time_s), np.nan)
         return recording, unknown, unknown, notes
     beside = joined(recording, rig) if isinstance(rig, RigLog) else rig
-    notes += [beside.clock_text(), *beside.notes]
+    notes += [beside.clocks.words(), *beside.notes]
     return beside.recording, beside.force_n, beside.set_position_mm, notes
 
 

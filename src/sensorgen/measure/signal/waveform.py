@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.core.arrays import Real
-from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.core.arrays import Complex, Real
+from sensorgen.core.errors import OutOfRange
 
 TONES_HZ = (1100.0, 2300.0, 5300.0, 10100.0, 19900.0, 49900.0, 99700.0)  # thesis, Table 5.1; it prints 4990 for 49900
 WEIGHTS = (10.0, 7.0, 4.5, 3.0, 2.0, 1.5, 1.0)
@@ -77,28 +77,8 @@ def multisine(tones_hz: Real, rate_hz: float, count: int) -> Multisine:
     return Multisine(samples / peak, weights / peak)
 
 
-Complex = NDArray[np.complex128]
 _BATCH = 1 << 16  # samples that fit into the cache
 _SEGMENT = 256  # least samples of a segment: large enough for the matrix product, small enough for the sum
-
-
-@dataclass(frozen=True, eq=False)
-class Demodulated:
-    """Impedances of consecutive windows.
-
-    Attributes
-    ----------
-    time_s : (n,) array
-        Middles of the windows [s].
-    impedance_ohm : (n, m) array
-        Impedance at m tones [ohm].
-    clipped : (n,) array
-        Windows in which a waveform stays at the end of its range.
-    """
-
-    time_s: NDArray[np.float64]
-    impedance_ohm: Complex
-    clipped: NDArray[np.bool_]
 
 
 def window_samples(rate_hz: float, tones_hz: ArrayLike) -> int:
@@ -186,48 +166,11 @@ def _transformed(windows: NDArray[Any], bins: NDArray[np.int64]) -> Complex:
 def _factors(size: int, bins: tuple[int, ...]) -> tuple[NDArray[np.float64], Complex]:
     """Matrix of a segment: real parts, imaginary parts; phase factors of the segments."""
     segment = next(n for n in range(min(_SEGMENT, size), size + 1) if size % n == 0)
-    within, between = (_turns(at, np.array(bins), size) for at in (np.arange(segment), np.arange(0, size, segment)))
+    within, between = (  # whole turns are removed first, to keep the digits
+        np.exp(-2j * np.pi * (np.outer(at, bins) % size) / size)
+        for at in (np.arange(segment), np.arange(0, size, segment))
+    )
     return np.hstack([within.real, within.imag]), between
-
-
-def _turns(at: NDArray[np.int64], bins: NDArray[np.int64], size: int) -> Complex:
-    """Phase factors at some samples; whole turns are removed first, to keep the digits."""
-    return np.asarray(np.exp(-2j * np.pi * (np.outer(at, bins) % size) / size))
-
-
-def impedance(
-    voltage_v: ArrayLike, current_a: ArrayLike, rate_hz: float, tones_hz: ArrayLike, range_v: float = np.inf,
-    range_a: float = np.inf,
-) -> Demodulated:  # fmt: skip
-    """Impedance at every tone from two simultaneous waveforms.
-
-    Parameters
-    ----------
-    voltage_v, current_a : (n,) array
-        Waveforms [V], [A].
-    rate_hz : float
-        Sampling rate [Hz].
-    tones_hz : (m,) array
-        Tones [Hz].
-    range_v, range_a : float
-        Ranges of the instrument [V], [A].
-
-    Raises
-    ------
-    BadInput
-        Waveforms of different lengths; a tone without current.
-    OutOfRange
-        As :func:`window_samples`.
-    """
-    voltage, current = np.asarray(voltage_v), np.asarray(current_a)
-    if voltage.shape != current.shape or voltage.ndim != 1:
-        raise BadInput(f"waveforms of {voltage.shape} and {current.shape} samples; expected two of one length")
-    size = window_samples(rate_hz, tones_hz)
-    u, i = (phasors(signal, rate_hz, tones_hz, size) for signal in (voltage, current))
-    if not i.all():
-        raise BadInput("a tone carries no current at all; expected the waveform of the current")
-    beyond = clipped(voltage, range_v, size, len(u)) | clipped(current, range_a, size, len(u))
-    return Demodulated(np.asarray((np.arange(len(u)) + 0.5) * size / rate_hz, float), u / i, beyond)
 
 
 def clipped(signal: NDArray[Any], limit: float, size: int, count: int) -> NDArray[np.bool_]:

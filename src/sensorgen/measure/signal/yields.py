@@ -8,8 +8,9 @@ standard error (Korn and Graubard 1998).
 
 from array import array
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, product
 from math import comb, isnan, nan, prod
 from statistics import median
 from typing import Any
@@ -204,9 +205,9 @@ def independence(table: Sequence[tuple[int, int]]) -> float:
     >>> round(independence([(4, 0), (0, 4)]), 4)
     0.0286
     """
-    if any(n < 0 for row in table for n in row):
+    if min(chain([0], *table)) < 0:
         raise OutOfRange("expected counts from 0 on")
-    sizes, seen = [a + b for a, b in table], [a for a, _ in table]
+    sizes, seen = list(map(sum, table)), [a for a, _ in table]
     if sum(sizes) > _MOST or prod(sorted(n + 1 for n in sizes)[:-1]) > _MOST_TABLES:
         return _drawn(sizes, seen)
     ways = prod(comb(n, k) for k, n in zip(seen, sizes, strict=True))
@@ -229,14 +230,9 @@ def _drawn(sizes: Sequence[int], seen: Sequence[int]) -> float:
     return (1 + unlikely) / (1 + _DRAWS)
 
 
-def _every(sizes: Sequence[int], did: int) -> Iterable[int]:
+def _every(sizes: Sequence[int], did: int) -> Iterator[int]:
     """Number of arrangements of each table with the same sums."""
-    if not sizes:
-        return [1] if did == 0 else []
-    rest = sizes[1:]
-    room = sum(rest)
-    return [
-        comb(sizes[0], k) * ways
-        for k in range(max(0, did - room), min(sizes[0], did) + 1)
-        for ways in _every(rest, did - k)
-    ]
+    *others, largest = sorted(sizes) or [0]
+    for counts in product(*(range(n + 1) for n in others)):
+        if 0 <= (left := did - sum(counts)) <= largest:
+            yield prod(map(comb, others, counts)) * comb(largest, left)

@@ -69,11 +69,9 @@ class Blank:
 
 def _between(values: Real, at: tuple[float, ...], x: float) -> Real:
     """The parabola through three values along the first axis."""
-    total = 0.0
-    for k in range(3):
-        i, j = (n for n in range(3) if n != k)
-        total = total + values[k] * (x - at[i]) * (x - at[j]) / ((at[k] - at[i]) * (at[k] - at[j]))
-    return np.asarray(total)
+    from scipy.interpolate import KroghInterpolator
+
+    return np.asarray(KroghInterpolator(at, values)(x))
 
 
 def blank(design: Design) -> Blank:

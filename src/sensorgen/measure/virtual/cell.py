@@ -184,9 +184,7 @@ def gradients(at_m: Real) -> tuple[Real, Real]:
     corner = _corners(dimensions)
     point = (0.5 + _GAUSS * (2 * corner - 1))[:, None]
     value = np.where(corner, point, 1 - point)
-    by = np.stack([
-        (2 * corner[:, k] - 1) * np.delete(value, k, -1).prod(-1) for k in range(dimensions)
-    ], -1)  # fmt: skip
+    by = np.stack([(2 * corner[:, k] - 1) * np.delete(value, k, -1).prod(-1) for k in range(dimensions)], -1)
     turn = np.einsum("eni,gnk->egik", at_m, by)
     return by @ np.linalg.inv(turn), np.linalg.det(turn) / len(corner)
 

@@ -41,7 +41,7 @@ _LINES = {
     "error": "reports an error of its own",
     "stuck": "accepts set points and ignores them",
 }
-_OWN: dict[Strikes, dict[str, str]] = {
+BY_DEVICE: dict[Strikes, dict[str, str]] = {
     "actuator": _LINES
     | {
         "error": "switches its motor off and sets the error bit of its status",
@@ -71,7 +71,7 @@ _OWN: dict[Strikes, dict[str, str]] = {
     },
 }
 FAULTS: Mapping[str, Fault] = {
-    f"{device} {name}": Fault(device, name, about) for device, own in _OWN.items() for name, about in own.items()
+    f"{device} {name}": Fault(device, name, about) for device, own in BY_DEVICE.items() for name, about in own.items()
 }
 """All of them, by name: the simulator and what happens to it."""
 
@@ -145,17 +145,15 @@ class FaultSchedule:
                 target.fault = ""
 
     def _begin(self, time_s: float, force_n: float) -> None:
-        for one in [p for p in self._waiting if self._due(p, time_s, force_n)]:
+        for one in tuple(self._waiting):
+            if not (time_s >= one.at_s if one.at_s is not None else force_n >= (one.at_force_n or 0.0)):
+                continue
             self._waiting.remove(one)
             fault = FAULTS[one.what]
             if fault.strikes in self._targets:
                 self._targets[fault.strikes].fault = fault.sets
             if one.for_s is not None:
                 self._lasting.append((time_s + one.for_s, fault))
-
-    @staticmethod
-    def _due(one: Planted, time_s: float, force_n: float) -> bool:
-        return time_s >= one.at_s if one.at_s is not None else force_n >= (one.at_force_n or 0.0)
 
     def __bool__(self) -> bool:
         """Test whether anything is to come."""

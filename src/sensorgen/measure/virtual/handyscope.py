@@ -14,10 +14,10 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.measure.lab.devices import Clock, DeviceFault, Identity, Readings, WrongDevice
+from sensorgen.measure.lab.handyscope import Bridge
 from sensorgen.measure.signal.waveform import multisine
 from sensorgen.measure.virtual.plant import Plant
 
-FAULTS = ("unplugged", "hung", "data loss", "clipped", "nan", "silent", "generator off", "in use", "wrong device")
 WINDOW_S, RATE_HZ, BITS = 0.01, 1e6, 14
 RANGES_V = (0.2, 0.4, 0.8, 2.0, 4.0, 8.0, 20.0, 40.0, 80.0)
 SERIAL = 28734
@@ -30,15 +30,11 @@ INPUT_LSB = 0.5  # noise of an input
 
 
 @dataclass(frozen=True)
-class Analyser:
-    """Analyser between the specimen and the numbers.
+class Analyser(Bridge):
+    """Bridge, noise and clock between the specimen and the numbers.
 
     Attributes
     ----------
-    feedback_ohm, feedback_f : float
-        Feedback of the bridge [ohm], [F].
-    gain : tuple of (float, complex)
-        Tone [Hz], and output of the bridge over what its feedback lets expect; 1 at others.
     noise_a : float
         Current noise at its input [A per root Hz].
     skew_ppm : float
@@ -49,22 +45,10 @@ class Analyser:
         Of the noise.
     """
 
-    feedback_ohm: float = 2610.0
-    feedback_f: float = 3.9e-12
-    gain: tuple[tuple[float, complex], ...] = ()
     noise_a: float = 1e-10
     skew_ppm: float = 0.0
     latency_s: float = 0.02
     seed: int = 0
-
-    def gains(self, tones_hz: Real) -> Complex:
-        """Gain of (m,) tones."""
-        return np.array([dict(self.gain).get(round(float(f), 3), 1.0) for f in tones_hz], complex)
-
-    def transimpedance(self, tones_hz: Real) -> Complex:
-        """Output of the bridge over current, of (m,) tones [ohm]."""
-        admittance = 1 / self.feedback_ohm + 2j * np.pi * tones_hz * self.feedback_f
-        return np.asarray(-self.gains(tones_hz) / admittance)
 
     def output_noise_v(self) -> float:
         """Deviation of a sample of the bridge's output [V]."""
@@ -104,24 +88,20 @@ class PhasorMeter:
         Of the run.
     analyser : Analyser, optional
         Bridge, noise and clock.
-    range_v : float
-        Range of the bridge's output [V].
     calibrated : bool
         Whether the readings are corrected by the true gain of the bridge.
 
     Attributes
     ----------
     fault : str
-        "", or one of ``FAULTS``; it acts while it is set.
+        Planted fault, or ""; it acts while it is set.
     """
 
     def __init__(
-        self, plant: Plant, clock: Clock, analyser: Analyser | None = None, *, range_v: float = 0.8,
-        calibrated: bool = True,
-    ) -> None:  # fmt: skip
-        self.fault = ""
+        self, plant: Plant, clock: Clock, analyser: Analyser | None = None, *, calibrated: bool = True
+    ) -> None:
+        self.fault, self._calibrated = "", calibrated
         self._plant, self._clock, self._analyser = plant, clock, analyser or Analyser()
-        self._range_v, self._calibrated = range_v, calibrated
         self._noise = np.random.default_rng(self._analyser.seed)
         self._windows: Windows | None = None
 
@@ -142,7 +122,7 @@ class PhasorMeter:
         self._transimpedance = analyser.transimpedance(self._tones)
         self._windows = Windows(self._plant, self._clock, analyser)
         self._heard, self._losses = self._clock.now(), 0
-        ranges = (next(r for r in RANGES_V if r >= voltage_v), next(r for r in RANGES_V if r >= self._range_v))
+        ranges = [next(r for r in RANGES_V if r >= peak) for peak in (voltage_v, analyser.range_v)]
         steps = np.array([2 * limit / 2**BITS for limit in ranges])
         samples = np.hypot(np.hypot(INPUT_LSB, 1 / np.sqrt(12)) * steps, [0.0, analyser.output_noise_v()])
         self._deviation_v, self._limit_v = samples * np.sqrt(2 / (WINDOW_S * RATE_HZ)), ranges[1]

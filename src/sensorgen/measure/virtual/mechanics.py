@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache
 from math import copysign, exp, inf, sqrt
 from typing import Annotated, Any
 
@@ -325,16 +326,13 @@ class VirtualRig:
         state.value, state.duration_s = max(state.value, self.force_n), state.duration_s + dt
 
 
+@lru_cache(maxsize=256)
 def _relaxed(dt: float) -> Real:
-    if dt not in _RELAXED:
-        if len(_RELAXED) > 256:
-            _RELAXED.clear()
-        _RELAXED[dt] = 1 - np.exp(-dt / np.array(_CREEP_S))
-    return _RELAXED[dt]
+    """Share of a change of the force that each creeping part has followed after a time [s]."""
+    return np.asarray(1 - np.exp(-dt / np.array(_CREEP_S)))
 
 
-_RELAXED: dict[float, Real] = {}
-_CREPT_AT_1_S = _PER_TIME * float(np.sum(1 - np.exp(-1 / np.array(_CREEP_S))))
+_CREPT_AT_1_S = _PER_TIME * float(np.sum(_relaxed(1.0)))
 
 
 Waves = Annotated[tuple[float, ...], Field(strict=False)]

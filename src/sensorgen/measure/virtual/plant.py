@@ -65,7 +65,7 @@ class Simulator:
         Every line that has come.
     """
 
-    END = b"\n"
+    END, GARBAGE = b"\n", b"\x7f?<\n"
 
     def __init__(self, plant: Plant) -> None:
         self.fault = ""
@@ -89,6 +89,11 @@ class Simulator:
         self._step()
         sent, self._out = bytes(self._out), bytearray()
         return b"" if self.fault in ("silent", "hung") else sent
+
+    def _spoilt(self, answer: bytes) -> bytes:
+        """An answer as faults of the line have it."""
+        answer = self.GARBAGE if self.fault == "garbage" else answer
+        return answer[: len(answer) // 2] if self.fault == "truncated" else answer
 
     def _step(self) -> None:
         """Step of the device by itself, whether anything has come or not."""

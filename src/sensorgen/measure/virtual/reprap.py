@@ -10,7 +10,6 @@ from collections import deque
 
 from sensorgen.measure.virtual.plant import Plant, Simulator
 
-FAULTS = ("silent", "hung", "garbage", "identity", "truncated", "cut", "error", "stuck")
 _SESSION_S, _QUEUE, _BUFFER = 8.0, 40, 1024
 _HOMING_MM_S = 20.0
 _WORDS = re.compile(r"([A-Z])(-?[0-9.]*)")
@@ -30,11 +29,13 @@ class RepRapFirmware(Simulator):
     Attributes
     ----------
     fault : str
-        Planted fault, one of ``FAULTS``, or "". ``silent``: no answers; ``hung``: no answers and no action;
+        Planted fault, or "". ``silent``: no answers; ``hung``: no answers and no action;
         ``stuck``: moves are accepted and not carried out; ``error``: moves are refused with a message.
     heard : list of bytes
         Every line or request that has come.
     """
+
+    GARBAGE = b"\x7f?<\nok\n"
 
     def __init__(self, plant: Plant, *, password: str = "reprap") -> None:  # noqa: S107
         super().__init__(plant)
@@ -62,8 +63,7 @@ class RepRapFirmware(Simulator):
         self._step()
         if self.fault == "silent":
             raise TimeoutError("timed out")
-        text = "\x7f?<" if self.fault == "garbage" else text
-        return status, text[: len(text) // 2 if self.fault == "truncated" else None].encode()
+        return status, self._spoilt(text.encode())
 
     def _request(self, name: str, query: dict[str, str], time_s: float) -> tuple[int, str]:
         if self.fault == "identity":
@@ -212,6 +212,4 @@ class RepRapFirmware(Simulator):
             self._replies.append(f"{reply}\n")
             self._sequence += 1
             return
-        text = (f"{reply}\n" if reply else "") + "ok\n"
-        text = "\x7f?<\nok\n" if self.fault == "garbage" else text
-        self._out += text[: len(text) // 2 if self.fault == "truncated" else None].encode()
+        self._out += self._spoilt((f"{reply}\nok\n" if reply else "ok\n").encode())

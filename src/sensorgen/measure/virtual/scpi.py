@@ -7,7 +7,6 @@ import numpy as np
 
 from sensorgen.measure.virtual.plant import Plant, Simulator
 
-FAULTS = ("silent", "hung", "garbage", "identity", "truncated", "cut", "error", "stuck", "overload")
 IDENTITIES = {
     "hp-4284a": "HEWLETT-PACKARD,4284A,2940J01234,REV01.20",
     "keysight-e4980a": "Keysight Technologies,E4980A,MY46412345,A.06.16",
@@ -24,7 +23,7 @@ class _Instrument(Simulator):
     Attributes
     ----------
     fault : str
-        Planted fault, one of ``FAULTS``, or "". ``stuck``: settings are not taken; ``error``: an entry in its list of
+        Planted fault, or "". ``stuck``: settings are not taken; ``error``: an entry in its list of
         errors; ``overload``: what it measures is beyond its range.
     heard : list of bytes
         Every line that has come.
@@ -38,7 +37,7 @@ class _Instrument(Simulator):
 
     def _step(self) -> None:
         while self._later and self._later[0][0] <= self._now_s:  # in the order of the questions
-            self._out += self._spoilt(self._later.pop(0)[1])
+            self._out += self._spoilt(self._later.pop(0)[1].encode() + b"\n")
 
     def _take(self, line: bytes) -> None:
         """One line: a common command, or one of this instrument."""
@@ -59,12 +58,6 @@ class _Instrument(Simulator):
     def _own(self, command: str, value: str, time_s: float, /) -> bool:
         """Test whether this instrument has a command."""
         raise NotImplementedError
-
-    def _spoilt(self, text: str) -> bytes:
-        if self.fault == "garbage":
-            return b"\x7f?<\n"
-        line = text.encode() + b"\n"
-        return line[: len(line) // 2] if self.fault == "truncated" else line
 
 
 class SimulatedLcrMeter(_Instrument):

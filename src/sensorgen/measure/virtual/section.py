@@ -4,8 +4,8 @@ Every interface of a section, level or sloping, is a line of edges of elements.
 """
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Collection, Mapping, Sequence
+from itertools import chain, pairwise
 from math import prod
 
 import numpy as np
@@ -59,24 +59,20 @@ def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM)
     sides = [columns_[0].left_mm, *(c.right_mm for c in columns_)]
     widest = max(fine_mm, (sides[-1] - sides[0]) / _MOST_COLUMNS)
     lines = _interfaces(columns_)
-    rows = [max(round(np.max([of[k + 1] - of[k] for of in lines]) / fine_mm), 1) for k in range(len(lines[0]) - 1)]
-    pieces = [1] if len(columns_) == 1 else [max(int(np.ceil((b - a) / widest - 1e-6)), 1) for a, b in pairwise(sides)]
+    highest = np.max([np.diff(of, axis=0) for of in lines], axis=(0, 2))
+    rows = np.maximum(np.round(highest / fine_mm), 1).astype(int).tolist()
+    pieces = np.maximum(np.ceil(np.diff(sides) / widest - 1e-6), 1).astype(int).tolist() if len(columns_) > 1 else [1]
     shares = np.concatenate([[0.0], *(k + graded(n) for k, n in enumerate(rows))])
-    x, material, electrode = [sides[0]], [], []
-    z = list[Real]()
+    x, z, kinds = [sides[0]], list[Real](), list[Whole]()
     for column, of, n in zip(columns_, lines, pieces, strict=True):
         x += (column.left_mm + (column.right_mm - column.left_mm) * graded(n)).tolist()
         ends = [np.interp(shares, np.arange(len(of)), of[:, side]) for side in (0, 1)]
         at = [0.0, *graded(n).tolist()]
         z += [ends[0] + (ends[1] - ends[0]) * share for share in at[bool(z) :]]
         for share in np.add(at[1:], at[:-1]) / 2:
-            kinds = _kinds(column, ends, share, materials)
-            material.append(kinds[0])
-            electrode.append(kinds[1])
-    return SectionRaster(
-        np.array(x) * M_PER_MM, np.array(z).T * M_PER_MM, np.array(material).T, np.array(electrode).T,
-        scene.repeats[across],
-    )  # fmt: skip
+            kinds.append(_kinds(column, ends, share, materials))
+    material, electrode = np.moveaxis(np.array(kinds), 0, 2)
+    return SectionRaster(np.array(x) * M_PER_MM, np.array(z).T * M_PER_MM, material, electrode, scene.repeats[across])
 
 
 def graded(count: int) -> Real:
@@ -87,9 +83,10 @@ def graded(count: int) -> Real:
 
 def _interfaces(columns_: Sequence[SectionColumn]) -> list[Real]:
     """Heights of the interfaces of all columns at their sides, the same ones from side to side [mm]."""
-    levels = _levels(columns_)
-    lines = [_lines(c, levels) for c in columns_]
-    if len({len(of) for of in lines}) > 1 or not _joined(lines):
+    ends = [{end for layer in c.layers for end in (layer.bottom_mm, layer.top_mm)} for c in columns_]
+    levels = {0.0, *(round(a, 9) for a, b in chain(*ends) if abs(a - b) < _NONE_MM and a > _NONE_MM)}
+    lines = [_lines(of, levels) for of in ends]
+    if len(set(map(len, lines))) > 1 or not _joined(lines):
         raise OutOfRange(
             "a virtual specimen of a section whose sloping interfaces end inside it; print it: what is printed in "
             "layers has level ones"
@@ -97,16 +94,8 @@ def _interfaces(columns_: Sequence[SectionColumn]) -> list[Real]:
     return lines
 
 
-def _levels(columns_: Sequence[SectionColumn]) -> list[float]:
-    """Heights at which some interface is level."""
-    ends = (end for column in columns_ for layer in column.layers for end in (layer.bottom_mm, layer.top_mm))
-    level = sorted({round(a, 9) for a, b in ends if abs(a - b) < _NONE_MM})
-    return [0.0, *(z for z in level if z > _NONE_MM)]
-
-
-def _lines(column: SectionColumn, levels: Sequence[float]) -> Real:
+def _lines(ends: Collection[Point], levels: Collection[float]) -> Real:
     """Heights of all interfaces of a column at its sides, upwards (k, 2) [mm]: its sloping ones and all levels."""
-    ends = {end for layer in column.layers for end in (layer.bottom_mm, layer.top_mm)}
     sloping = [end for end in ends if abs(end[0] - end[1]) >= _NONE_MM]
     return np.array(sorted([*((z, z) for z in levels), *sloping], key=lambda e: (round(sum(e), 9), e)))
 
@@ -117,21 +106,18 @@ def _joined(lines: Sequence[Real]) -> bool:
     return meet and all((np.diff(of, axis=0) >= -10 * _NONE_MM).all() for of in lines)
 
 
-def _kinds(
-    column: SectionColumn, ends: Sequence[Real], share: float, materials: Mapping[str, int]
-) -> tuple[list[int], list[int]]:
-    """Materials and terminals of a column's elements, upwards, at a share of its width."""
+def _kinds(column: SectionColumn, ends: Sequence[Real], share: float, materials: Mapping[str, int]) -> Whole:
+    """Materials and terminals of a column's elements, upwards, at a share of its width (2, n)."""
     z = ends[0] + (ends[1] - ends[0]) * share
     spans = [tuple(e[0] + (e[1] - e[0]) * share for e in (layer.bottom_mm, layer.top_mm)) for layer in column.layers]
     bottoms = [low for low, _ in spans]
-    bodies: list[Body | None] = []
-    for middle in ((z[1:] + z[:-1]) / 2).tolist():
+    kinds = np.zeros((2, len(z) - 1), int)
+    for n, middle in enumerate(((z[1:] + z[:-1]) / 2).tolist()):
         k = bisect_right(bottoms, middle) - 1
-        bodies.append(column.layers[k].body if k >= 0 and middle < spans[k][1] else None)
-    return (
-        [materials[b.material] if b else 0 for b in bodies],
-        [TERMINALS.get(b.terminal, 0) if b else 0 for b in bodies],
-    )
+        if k >= 0 and middle < spans[k][1]:
+            body = column.layers[k].body
+            kinds[:, n] = materials[body.material], TERMINALS.get(body.terminal, 0)
+    return kinds
 
 
 _STEP_MM = 1e-6

@@ -7,7 +7,6 @@ from math import inf
 
 from sensorgen.measure.virtual.plant import Plant, Simulator
 
-FAULTS = ("silent", "hung", "garbage", "identity", "truncated", "echo", "cut", "error", "stuck", "runaway")
 _SIGNED = {
     0x6071: 16, 0x6077: 16, 0x60E0: 16, 0x60E1: 16, 0x607A: 32, 0x6064: 32, 0x60F4: 32, 0x6061: 8, 0x6098: 8,
     0x607C: 32,
@@ -30,14 +29,14 @@ class SmacController(Simulator):
     Attributes
     ----------
     fault : str
-        Planted fault, one of ``FAULTS``, or "". ``silent``: no answers; ``hung``: no answers and no action;
+        Planted fault, or "". ``silent``: no answers; ``hung``: no answers and no action;
         ``stuck``: set-points are stored and ignored; ``runaway``: the motor goes to the largest force allowed;
         ``error``: it reports too high a current once.
     heard : list of bytes
         Every line that has come.
     """
 
-    END = b"\r"
+    END, GARBAGE = b"\r", b"\xfe?~0x2\r"
 
     def __init__(self, plant: Plant, *, newton_per_unit: float = 0.0167, mm_per_count: float = 0.005) -> None:
         super().__init__(plant)
@@ -153,9 +152,7 @@ class SmacController(Simulator):
             line = b"0x20 W 0x%X 0x%X\r" % (what, value % (1 << bits))
         else:
             line = b"0x20 W 0x%X %d\r" % (what, value)
-        if self.fault == "garbage":
-            line = b"\xfe?~" + line[:3] + b"\r"
-        self._out += line[: len(line) // 2] if self.fault == "truncated" else line
+        self._out += self._spoilt(line)
 
     def _write(self, what: int, value: int) -> None:
         if what == 0x6040:
@@ -184,9 +181,9 @@ class SmacController(Simulator):
 
     def _control(self, value: int) -> None:
         """Control word: state machine, and the bit that begins a move or homing."""
-        before, self._objects[0x6040] = self._objects[0x6040], value
+        risen, self._objects[0x6040] = value & ~self._objects[0x6040], value
         if self._state() == 0x08:
-            if value & 0x80 and not before & 0x80:
+            if risen & 0x80:
                 self._objects |= {0x6041: 0x40, 0x603F: 0, 0x1001: 0}
             return
         low = value & 0x0F
@@ -194,7 +191,7 @@ class SmacController(Simulator):
             self._turn(0x40)
         elif low in _SWITCHED and self._state() in _FROM.get(low, (self._state(),)):
             self._turn(_SWITCHED[low])
-        if self._state() == 0x27 and value & 0x10 and not before & 0x10:
+        if self._state() == 0x27 and risen & 0x10:
             self._begin()
 
     def _turn(self, state: int) -> None:

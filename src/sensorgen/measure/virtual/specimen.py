@@ -18,7 +18,6 @@ from sensorgen.measure.virtual.blank import Blank, blank, tracks
 
 PIECES = 60  # of the chain that the line is
 _THINNEST_M = 1e-12  # of a piece
-_SHORTEST_S = 0.1  # of a hold, as its logarithm counts
 _SIZES = 0.02, 0.01  # of ln R and ln C: thickness and width of printed tracks, width of cells
 
 
@@ -322,8 +321,3 @@ def _piece(series: Real, shunt: Complex) -> Complex:
     ch, z0 = np.cosh(s), np.sqrt(series / shunt)
     sh = np.sinh(s)
     return np.array([[ch, z0 * sh], [sh / z0, ch]])
-
-
-def decades(hold_s: float) -> float:
-    """Logarithm of a time over 1 s, as creep counts it."""
-    return float(np.log10(max(hold_s, _SHORTEST_S)))
