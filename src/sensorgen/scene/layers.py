@@ -104,7 +104,7 @@ def cleaned(region: Region) -> Region:
 def inside(region: Region, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Mask (n, m) of the places of a grid, at rising x (n,) and y (m,) [mm], that lie in a region.
 
-    An odd number of edges lies left of each: far sooner counted for a whole line than place by place.
+    An odd number of edges lies left of each: far sooner counted for a whole line than for each place by itself.
     """
     corners, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(region)), return_index=True)
     edges = np.stack([corners[:-1], corners[1:]], axis=1)[ring[1:] == ring[:-1]]
