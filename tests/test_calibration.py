@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from sensorgen.core.errors import BadInput
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.calibration import calibration as records
+from sensorgen.prediction.calibration import inversion
 from sensorgen.prediction.calibration.calibration import coverage_of, held_out, inside
 from sensorgen.prediction.calibration.fitting import by_rest, calibrated, gain, prior, shared, widened
 from sensorgen.prediction.calibration.inversion import Inverter, Verdict
@@ -50,6 +52,38 @@ def test_tones_do_not_average_out_the_gain_that_they_share(model):
     at = many.names.index("capacitance")
     error, common = spread.capacitance * np.sqrt(found.covariance[at, at]), spread.gain / np.sqrt(2)
     assert error == pytest.approx(1 / np.hypot(1 / common, 1 / spread.capacitance), rel=0.02)
+
+
+@pytest.mark.parametrize("step", [0.7, 1.5])
+def test_a_grid_as_coarse_as_a_reading_tells_has_the_quantiles_of_the_density(step):
+    """Normal densities of standard deviation 1, cut off by an end of the grid or not, at points ``step`` apart."""
+    grid, middle = np.arange(0.0, 20.0, step), np.linspace(0.5, 12.0, 200)
+    weight = np.diff(np.concatenate([grid[:1], (grid[1:] + grid[:-1]) / 2, grid[-1:]]))
+    edges, share = inversion._finer(grid, weight[:, None] * norm.pdf(grid[:, None], middle))
+    found = inversion._quantiles(edges, share, (0.05, 0.95))
+    below = norm.cdf(-middle)  # outside of the grid
+    exact = norm.ppf(below[:, None] + (1 - below[:, None]) * [0.05, 0.95]) + middle[:, None]
+    assert found == pytest.approx(exact, abs=0.06)
+    assert np.ptp(found, axis=1).mean() == pytest.approx(np.ptp(exact, axis=1).mean(), rel=0.0125)  # 9 % by even cells
+    ends, inside = inversion._densest(edges, share, 0.9), middle > 4
+    assert np.ptp(ends, axis=1)[inside].mean() == pytest.approx(2 * norm.ppf(0.95), rel=0.015)
+
+
+def test_intervals_of_a_known_sensor_hold_nine_tenths_of_the_presses_that_were_expected(model):
+    """Presses drawn from the prior of force and position, readings with their noise alone: 90 %, not 92 %."""
+    noise, rng = np.full(len(TONES_HZ), 1e-3), np.random.default_rng(5)
+    known = prior(model, noise)
+    known = replace(
+        known, covariance=1e-10 * known.covariance, scatter=1e-7, wander_c=1e-8, wander_r=1e-8,
+        unloading=(0.0, 1e-6), decades=(0.0, 1e-6),
+    )  # fmt: skip
+    presses = unknown(rng.uniform(0, LIMIT_N, 8000), rng.uniform(0, model.sensor.length_m, 8000))
+    white = rng.standard_normal((2, 8000, len(TONES_HZ)))
+    found = Inverter(model, known, force_limit_n=LIMIT_N).batch(
+        model.ratio(known.at, presses) + noise * (white[0] + 1j * white[1])
+    )
+    covered = [mask.mean() for mask in inside(found, presses)]
+    assert covered == pytest.approx([0.9, 0.9], abs=0.01)  # three standard deviations
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rise_reference import compared, in_3d, of_another_program, scenes
+from rise_reference import compared, in_3d, of_another_program, scenes, with_contact
 
 
 @pytest.mark.parametrize("entry", [
@@ -24,6 +24,18 @@ def test_the_stated_error_holds_in_3d(entry):
     """Round cells and crossed strips, by NGSolve on the square cell."""
     errors, stated = compared(entry)
     assert (abs(errors) < stated).all()
+
+
+@pytest.mark.parametrize("entry", [
+    pytest.param(e, id=f"cell {k} to {e['rise_nf_per_m2'][-1][0]:g} kPa", marks=[pytest.mark.nightly] * (k > 0))
+    for k, e in enumerate(with_contact())
+])  # fmt: skip
+def test_the_stated_error_holds_where_flanks_touch(entry):
+    """Drawn cells whose flanks roll onto each other, up to 1103 kPa, by NGSolve."""
+    errors, stated = compared(entry)
+    assert len(errors) == len(entry["rise_nf_per_m2"])
+    assert (abs(errors) < stated).all()
+    assert stated.max() < 0.04
 
 
 def test_references_of_our_own_meshes_agree_with_another_program():

@@ -100,6 +100,18 @@ def test_beyond_the_last_point_it_goes_on_straight_and_says_so():
     assert law.doubt(1e5) == ""
 
 
+@pytest.mark.parametrize("slope_per_pa", [0.0, 4e-5])
+def test_a_straight_continuation_leaves_the_curve_before_it_as_it_was(slope_per_pa):
+    """Ten times as steep as the last piece, or flat: the interpolation up to the last point is SciPy's of the data."""
+    law = tri()
+    longer = compression.extended(law, 1e6, slope_per_pa)
+    inside, outside = np.linspace(2e4, 1e5, 50), np.array([2e5, 1e6])
+    known = PchipInterpolator(law.stress_pa, law.ratio)(inside)
+    assert 1 / (1 - longer.capacitive_strain(inside)[0]) == pytest.approx(known, rel=1e-9)
+    line = law.ratio[-1] + slope_per_pa * (outside - 1e5)
+    assert 1 / (1 - longer.capacitive_strain(outside)[0]) == pytest.approx(line, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("law", "stress", "said"),
     [

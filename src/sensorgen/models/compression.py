@@ -32,6 +32,7 @@ _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _SAME = 1e-6  # relative difference up to which two parameters are one
 _STIFF = 1e-3  # decay below which a plate counts as incompressible: 4e-7 of the modulus [-]
 _NODES = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25])  # of an average, over its last pressure
+_BEND = 1e-6  # share of a straight continuation over which a curve takes its slope [-]
 _EARLY = np.array([1 / 16, 1 / 4])  # of the first stress: knots of a curve that begins with a power of the stress
 
 
@@ -318,10 +319,12 @@ def beyond(law: Compression, mean_pa: float, shares: Callable[[float], Real]) ->
 def extended(law: CapacitanceCurve, most_pa: float, slope_per_pa: float) -> CapacitanceCurve:
     """Curve with a straight line from its last point to a pressure [Pa], its rise by that slope [1/Pa]."""
     last_pa, down = law.stress_pa[-1], law.displacement_m
-    ratio = law.ratio[-1] + slope_per_pa * (most_pa - last_pa)
+    bend_pa = _BEND * (most_pa - last_pa)  # a steep line that began at the last point would bend the cubic before it
+    rises = (slope_per_pa * bend_pa, slope_per_pa * (most_pa - last_pa))
     return replace(
-        law, stress_pa=(*law.stress_pa, most_pa), ratio=(*law.ratio, ratio),
-        slope_per_pa=(*law.slope_per_pa[:-1], slope_per_pa, slope_per_pa),
+        law, stress_pa=(*law.stress_pa, last_pa + bend_pa, most_pa),
+        ratio=(*law.ratio, *(law.ratio[-1] + rise for rise in rises)),
+        slope_per_pa=(*law.slope_per_pa, slope_per_pa, slope_per_pa),
         displacement_m=None if down is None else down * most_pa / last_pa,
     )  # fmt: skip
 

@@ -27,6 +27,8 @@ _COARSE = 20, 16  # forces and positions at which covariances are worked out
 _MOST = 128, 96  # forces and positions of the grid
 _LEAST = 40, 32
 _BLOCK = 128  # readings at a time
+_PARTS = 3  # of a cell of the grid, over which the density falls
+_COARSEST = 4.0  # change of ln of the density over a cell from which on it counts as even there
 _FEW_TONES = 2
 OTHERWISE = 0.1  # probability, until a recheck, that something else than the press makes a part of the reading: a guess
 _BELOW = 0.3  # share of what lies outside an interval that is below it, where that something is allowed for
@@ -245,24 +247,23 @@ class Inverter:
         ln = table.ln_density[:, None] - chi2 / 2
         ln -= ln.max(0)
         density = np.exp(ln).reshape(len(self.force_n), len(self.position_m), -1)
-        force, position = density.sum(1), density.sum(0)
+        force, position = _finer(self.force_n, density.sum(1)), _finer(self.position_m, density.sum(0))
         return replace(
             nothing(len(each)),
-            force_n=_quantiles(self.force_n, force, (0.5,))[:, 0], force_90_n=self._force_ends(force),
-            position_m=_quantiles(self.position_m, position, (0.5,))[:, 0],
-            position_90_m=_densest(self.position_m, position, self.level), chi2=chi2[best, each], more=more,
+            force_n=_quantiles(*force, (0.5,))[:, 0], force_90_n=self._force_ends(*force),
+            position_m=_quantiles(*position, (0.5,))[:, 0], position_90_m=_densest(*position, self.level),
+            chi2=chi2[best, each], more=more,
         )  # fmt: skip
 
-    def _force_ends(self, force: Real) -> Real:
-        """Ends of the interval of the force (n, 2), of probabilities of the grid's forces (f, n)."""
+    def _force_ends(self, edges: Real, force: Real) -> Real:
+        """Ends of the interval of the force (n, 2), of probabilities (k, n) between borders (k + 1,)."""
         out = 1 - self.level
         if not self._otherwise:
-            return _quantiles(self.force_n, force, (out / 2, 1 - out / 2))
-        edges = _edges(self.force_n)
+            return _quantiles(edges, force, (out / 2, 1 - out / 2))
         low, high = np.sqrt(edges[:-1]), np.sqrt(np.maximum(edges[1:], 1e-9))
         share = np.clip((np.minimum(high[:, None], high) - low[:, None]) / high, 0.0, None)  # of forces below another
         mixed = (1 - self._otherwise) * force + self._otherwise * share @ force
-        return _quantiles(self.force_n, mixed, (_BELOW * out, 1 - (1 - _BELOW) * out))
+        return _quantiles(edges, mixed, (_BELOW * out, 1 - (1 - _BELOW) * out))
 
     def _towards_more(self, root: NDArray[np.float32], points: Sequence[int], columns: Index) -> Real:
         """Unit vectors, whitened, in which another capacitance moves a reading the most, and no press (points, k)."""
@@ -403,29 +404,54 @@ def _steps(at: Real) -> Real:
     return np.diff(_edges(at))
 
 
-def _densest(grid: Real, probability: Real, level: float) -> Real:
-    """Ends of the most probable part of a grid (n, 2), of probabilities of its points (k, n): an end may belong to it.
+def _finer(grid: Real, probability: Real) -> tuple[Real, Real]:
+    """Borders of parts of the cells of a grid (r k + 1,), and their probabilities (r k, n), of its points' (k, n).
+
+    Ln of the density is a parabola about each point. Were the density even over a cell, which is about as wide as what
+    a reading tells, it would be wider than it is by the cell's own: intervals of 90 % held 92 %.
+    """
+    ln = np.log(np.maximum(probability, 1e-300) / _steps(grid)[:, None])
+    middle = np.clip(np.arange(len(grid)), 1, len(grid) - 2)
+    left, right = np.diff(grid)[middle - 1, None], np.diff(grid)[middle, None]
+    fall, rise = (ln[middle] - ln[middle - 1]) / left, (ln[middle + 1] - ln[middle]) / right
+    bend = (rise - fall) / (left + right)
+    edges = _edges(grid)
+    at = edges[:-1, None] + np.diff(edges)[:, None] * (np.arange(_PARTS) + 0.5) / _PARTS
+    away = (at - grid[middle, None])[:, :, None]
+    parabola = away * ((fall * right + rise * left) / (left + right))[:, None] + away**2 * bend[:, None]
+    parabola += (ln[middle] - ln)[:, None]  # less than the point's own
+    even = abs(bend) * np.maximum(left, right) ** 2 > _COARSEST  # the grid is too coarse to tell a shape
+    density = np.where(even[:, None], 0.0, np.minimum(parabola, _COARSEST))
+    share = probability[:, None] * np.exp(density)
+    parts = edges[:-1, None] + np.diff(edges)[:, None] * np.arange(_PARTS) / _PARTS
+    return np.append(parts, edges[-1]), share.reshape(-1, share.shape[2])
+
+
+def _densest(edges: Real, probability: Real, level: float) -> Real:
+    """Ends of the most probable cells (n, 2), of their borders (k + 1,) and probabilities (k, n): an end may be one.
 
     Between quantiles no reading of little information would have a press near an end.
     """
     share = probability / probability.sum(0)
-    order = np.argsort(-share / np.maximum(_steps(grid), 1e-300)[:, None], axis=0)
+    order = np.argsort(-share / np.maximum(np.diff(edges), 1e-300)[:, None], axis=0)
     ranked = np.take_along_axis(share, order, 0)
-    inside = np.cumsum(ranked, 0) - ranked < level
-    edges = _edges(grid)
-    return np.stack([
-        np.where(inside, edges[:-1][order], np.inf).min(0), np.where(inside, edges[1:][order], -np.inf).max(0)
-    ], 1)  # fmt: skip
+    before = np.cumsum(ranked, 0) - ranked
+    inside, n = before < level, np.arange(share.shape[1])
+    last = inside.sum(0) - 1
+    inside[last, n] = False
+    rest = np.where(last, (level - before[last, n]) / np.maximum(ranked[last, n], 1e-300), 1.0)  # of the last cell
+    start, end = edges[order[last, n]], edges[order[last, n] + 1]
+    low, high = np.where(inside, edges[:-1][order], np.inf).min(0), np.where(inside, edges[1:][order], -np.inf).max(0)
+    return np.stack([np.minimum(low, end - rest * (end - start)), np.maximum(high, start + rest * (end - start))], 1)
 
 
-def _quantiles(grid: Real, density: Real, shares: Sequence[float]) -> Real:
-    """Quantiles (n, q) of probabilities of a grid's points (k, n)."""
-    edges = _edges(grid)
+def _quantiles(edges: Real, density: Real, shares: Sequence[float]) -> Real:
+    """Quantiles (n, q) of probabilities (k, n) of cells between borders (k + 1,)."""
     total = np.concatenate([np.zeros((1, density.shape[1])), np.cumsum(density, 0)])
     total /= total[-1]
     quantiles = np.empty((density.shape[1], len(shares)))
     for k, share in enumerate(shares):
-        at = np.clip((total < share).sum(0), 1, len(grid))
+        at = np.clip((total < share).sum(0), 1, len(edges) - 1)
         low, high = total[at - 1, np.arange(len(quantiles))], total[at, np.arange(len(quantiles))]
         part = np.clip((share - low) / np.maximum(high - low, 1e-300), 0, 1)
         quantiles[:, k] = edges[at - 1] + part * (edges[at] - edges[at - 1])
