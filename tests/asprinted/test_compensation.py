@@ -52,7 +52,7 @@ def test_gap_and_capacitance_that_were_asked_for_come_out(film, walls, quality):
     assert before >= after == film
 
 
-def test_a_film_of_one_layer_is_refused_with_the_nearest(monkeypatch):
+def test_a_film_of_one_layer_is_refused_with_the_nearest(monkeypatch, shared_cache):
     """The printer's thinnest layers make 0.12 mm of two: the nearest of a few tries says so, and what it costs."""
     monkeypatch.setattr(compensation, "_MOST_SOLVED", 6)
     with pytest.raises(OutOfRange, match=r"2 layers at least, 0\.12 mm at layers of 0\.06 mm; nearest: ") as refused:
@@ -146,7 +146,7 @@ def taller(design, kinds):
     return [(("parameters", "hang_height_mm"), 0.536)]
 
 
-def test_a_period_that_leaves_an_island_in_the_air_becomes_one_that_fits_the_length(monkeypatch):
+def test_a_period_that_leaves_an_island_in_the_air_becomes_one_that_fits_the_length(monkeypatch, shared_cache):
     """The nearest, of 4.422 mm, leaves 0.16 mm of a hanging prism at the end of 100 mm."""
     monkeypatch.setattr(compensation.moves, "steps", taller)
     asked = design.make({"shape": "tri", "quality": "extrafine", "parameters": {"dielectric_mm": 0.2}})
@@ -169,7 +169,7 @@ def test_a_cut_period_is_a_length_in_the_plane_and_its_island_goes_too():
     assert not review(made, walls="cura-gaps").errors()
 
 
-def test_what_rules_refuse_in_whole_periods_too_is_refused_with_the_rule(monkeypatch):
+def test_what_rules_refuse_in_whole_periods_too_is_refused_with_the_rule(monkeypatch, shared_cache):
     def with_an_island(design, walls=""):
         island = Finding("9-bridge", "error", "film", "an island starts in mid-air", "")
         return Review({}, [island] * (design.params.period_mm != 2.0))
@@ -191,7 +191,7 @@ def test_a_named_design_gets_a_name_of_its_own():
     assert printable(made, bake=True)[0].name == "mine-compensated"
 
 
-def test_what_cannot_be_had_is_refused_with_the_nearest(monkeypatch):
+def test_what_cannot_be_had_is_refused_with_the_nearest(monkeypatch, shared_cache):
     """After fewer tries than usual."""
     monkeypatch.setattr(compensation, "_MOST_TRIED", 60)
     monkeypatch.setattr(compensation, "_MOST_SOLVED", 8)
@@ -249,7 +249,7 @@ def stiff(of_print):
     return with_stiffness
 
 
-def test_a_stiffness_that_was_asked_for_comes_out_with_gap_and_capacitance(monkeypatch):
+def test_a_stiffness_that_was_asked_for_comes_out_with_gap_and_capacitance(monkeypatch, shared_cache):
     """0.24 mm as drawn are 0.2 mm in whole layers; it is 0.3 mm that print as stiff."""
     asked = small(parameters={"dielectric_mm": 0.2})
     monkeypatch.setattr(compensation.moves, "steps", few)
@@ -262,7 +262,7 @@ def test_a_stiffness_that_was_asked_for_comes_out_with_gap_and_capacitance(monke
     assert estimated_gap(made, "arachne") == pytest.approx(0.2, abs=1e-9)
 
 
-def test_a_stiffness_that_cannot_be_had_is_refused_with_the_nearest(monkeypatch):
+def test_a_stiffness_that_cannot_be_had_is_refused_with_the_nearest(monkeypatch, shared_cache):
     monkeypatch.setattr(compensation.moves, "steps", few)
     monkeypatch.setattr(compensation, "of_body", stiff(lambda height: 10 * height))
     monkeypatch.setattr(compensation, "_MOST_SOLVED", 8)
