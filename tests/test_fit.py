@@ -357,6 +357,7 @@ def test_nothing_to_fit_to(tmp_path):
         fit(log, 23)
 
 
+@pytest.mark.usefixtures("roughly")
 def test_the_command(tmp_path, capsys):
     place = str(tmp_path / "log.db")
     with Log(tmp_path / "log.db", create=True) as log:
@@ -373,6 +374,7 @@ def test_the_command(tmp_path, capsys):
         cli.main(["fit", "--iteration", "61", "--log", place], standalone_mode=False)
 
 
+@pytest.mark.usefixtures("roughly")
 def test_specimens_of_any_name(tmp_path, capsys):
     """Three plates of an own design, bound by their names: an LCR meter's C 20 % above the prediction, and R_Y."""
     place, file = str(tmp_path / "log.db"), tmp_path / "mine.yaml"
