@@ -16,6 +16,8 @@ with suppress(ValueError):  # not in the main thread
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job would hand down a deaf ear
 
 
+os.fsync = lambda _: None  # no test cuts the power; tests/log/test_power.py counts the calls
+
 NUMBERS = itertools.count()
 
 
@@ -91,6 +93,15 @@ def at_rest(unpressed):
     import no_numbers
 
     with no_numbers.at_rest():
+        yield
+
+
+@pytest.fixture
+def roughly(_cache):
+    """Predictions by closed forms and of no load: for tests of words, and of logs that hold a prediction."""
+    import no_numbers
+
+    with no_numbers.roughly_at_rest():
         yield
 
 

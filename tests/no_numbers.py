@@ -37,12 +37,14 @@ def at_rest(folder="at-rest"):
 
 @contextmanager
 def roughly_at_rest():
-    """Resistance as ever, capacitance as closed forms have it, nothing under a load; for readings of a multimeter."""
+    """Resistance as ever, capacitance of the likely print by closed forms, no load; for readings of a multimeter."""
     from sensorgen.prediction import capacitance, planning, rest_state
 
     with pytest.MonkeyPatch.context() as patch, at_rest("rough"):
         for name in ("PLANE", "SPATIAL", "OPEN"):
             patch.setattr(capacitance, name, 10.0)
         patch.setattr(rest_state, "PLANE", 10.0)
+        patch.setattr(rest_state, "_other_prints", lambda *_: ([], [], False))
+        patch.setattr(rest_state, "_film_ratios", lambda *_: (1.0, 1.0, 0.0))
         patch.setattr(planning, "ACCURACY", 10.0)
         yield

@@ -120,6 +120,7 @@ def volume_mm3(vertices, triangles):
 
 
 @pytest.mark.parametrize("name", tiers(SHORTED, {*SHORTED} - FAST))
+@pytest.mark.usefixtures("roughly")
 def test_a_film_of_nothing_is_refused_unless_forced(name, tmp_path):
     variant = design.load(DESIGNS / name)
     with pytest.raises(Unprintable) as caught:

@@ -61,7 +61,7 @@ def test_intervals_hold_what_another_program_found(level):
 def test_a_film_that_is_a_tenth_too_stiff_is_seen():
     """The same intervals of a wrong cell miss the other program's."""
     wrong = SOLIDS | {"x60": Elastic(6.6e6, 0.4999)}
-    assert not all(holds(estimated(1, of=case(solids=wrong))))
+    assert not all(holds(estimated(of=case(solids=wrong))))
 
 
 def test_the_estimate_sees_the_apex():
@@ -116,7 +116,7 @@ def test_work_and_energy_agree_at_few_loads_and_a_wrong_energy_is_seen(monkeypat
     monkeypatch.setattr(pressed, "_FIRST", (1.0,))  # as it was: steps of 40 kPa alone
     stated = pressed._imbalance
     monkeypatch.setattr(pressed, "_imbalance", lambda p, u, e: stated(p, u, 1.05 * e))
-    assert "work and energy differ by" in mesh_ladder.pressed(of, [0.0, 1e4, 1e5], keep=False).faults[0]
+    assert "work and energy differ by" in mesh_ladder.pressed(of, [0.0, 1e4, 1e5], -1, keep=False).faults[0]
 
 
 @pytest.mark.parametrize("parameters", [OTHER, pytest.param({"dielectric_mm": 0.2}, marks=pytest.mark.nightly)])
@@ -163,7 +163,7 @@ def test_an_error_of_second_order_is_stated_a_quarter_larger(monkeypatch):
     assert found.rise_error_f_per_m2 == pytest.approx([0.0, 0.25e-9, 0.5e-9], rel=1e-6, abs=0)
 
 
-def test_a_coarser_mesh_that_is_stored_serves_as_one_that_is_solved(cache):
+def test_a_coarser_mesh_that_is_stored_serves_as_one_that_is_solved():
     """Stored it has every pressure of the finer mesh; solved for the comparison, one in four."""
     loads = np.linspace(0.0, 4e4, 10).tolist()
     fine = mesh_ladder.pressed(case(), loads)

@@ -317,7 +317,7 @@ def test_bounds_that_cross_stop_everything(failing):
 
 def test_a_real_plate_is_exact_without_any_solver():
     design = make({"shape": "reference"})
-    found = rest_state(drawn(design), 1e-12).answer
+    found = rest_state(drawn(design), 1e-12, ranges=False).answer
     assert found.model == "columns"
     assert found.capacitance_f.lower == pytest.approx(69.06266493984e-12, rel=1e-10, abs=0)
     assert [c.passed_over for c in found.plan if c.model != "columns"] == ["not needed"] * (len(found.plan) - 1)

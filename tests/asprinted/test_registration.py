@@ -30,7 +30,7 @@ def made(tmp_path_factory):
 
 
 def capacitance_f(design, file):
-    return rest_state(from_gcode(design, file)).capacitance.value
+    return rest_state(from_gcode(design, file), ranges=False).capacitance.value
 
 
 def changed(text, place):

@@ -193,8 +193,10 @@ def test_files_of_an_earlier_batch_that_are_no_longer_made_go_and_others_stay(pl
 
 
 def test_a_design_that_cannot_be_printed_stops_the_batch(plan, tmp_path):
-    path = plan("iteration: 26\ndesigns: [{shape: tri}, {shape: tri, parameters: {dielectric_mm: 0.0}}]\n")
-    with pytest.raises(Unprintable, match=r"^trix-d0: .*electrodes touch") as error:
+    size = "length_mm: 20, width_mm: 10"
+    sound, short = (f"{{shape: tri, parameters: {{{size}{film}}}}}" for film in ("", ", dielectric_mm: 0.0"))
+    path = plan(f"iteration: 26\ndesigns: [{sound}, {short}]\n")
+    with pytest.raises(Unprintable, match=r"^trix-d0-length20: .*electrodes touch") as error:
         make(path, tmp_path / "out", gcode=False)
     assert error.value.findings
     assert not (tmp_path / "out").exists()

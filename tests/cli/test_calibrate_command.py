@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 import in_process
+from sensorgen.analysis import calibration
 from sensorgen.measure.log import Log, prints
 from sensorgen.measure.log.bench import log_recording
+from sensorgen.measure.log.entries import Calibration
 from virtual_specimen import TONES_HZ, drawn, recorded, session, write_csv
 
 DESIGN = "shape: tri\nname: mine\nparameters:\n  dielectric_mm: 0.2\n"
@@ -51,20 +53,20 @@ def after(bench, tmp_path, monkeypatch):
     return bench
 
 
+def quickly(folder):
+    """What ``calibrate S1`` says as JSON, of no press that is held back: the record of ``made`` tells of these."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(calibration, "held_out", lambda *_: None)
+        patch.setenv("SENSORGEN_LOG", str(folder / "log.db"))
+        code, said = in_process.run(folder, "calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json")
+    assert code == 0
+    return json.loads(said)
+
+
 @pytest.fixture(scope="module")
-def told_before():
-    """Output of ``alone``, once for all tests of this file."""
-    return {}
-
-
-@pytest.fixture
-def alone(bench, told_before):
-    """The record of a calibration by known presses alone, which no test changes."""
-    if not told_before:
-        said = bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json")
-        assert (said.code, said.err) == (0, "")
-        told_before |= json.loads(said.out)
-    return told_before
+def alone(made):
+    """A calibration by known presses alone."""
+    return quickly(made)
 
 
 def unseen(path, count=100, truth=TRUTH):
@@ -115,10 +117,14 @@ def test_from_files_of_the_bench_to_force_and_place(after, tmp_path):
     assert covered(pressed, "position", "mm") >= 0.7
 
 
-def test_the_record_of_the_log_says_it_all(bench, alone):
+def test_the_record_of_the_log_says_it_all(bench, alone, made):
+    with Log(made / "calibrated" / "log.db") as log:
+        (row,) = log.entries(Calibration)
+    record = json.loads(row.data)
+    assert (record["schema"], record["held_out"]["presses"]) == (2, 24)
+    assert record["posterior"]["at"] == pytest.approx(alone["posterior"]["at"])
     assert alone["schema"] == 2
     assert len(alone["posterior"]["at"]) == len(alone["values"]) == len(alone["parameters"])
-    assert alone["held_out"]["presses"] == 24
     assert "was never calibrated" in bench("invert", "S1", "none.csv").line
 
 
@@ -233,7 +239,7 @@ def told(found, name):
     return next(v for v in found["values"] if v["name"] == name)
 
 
-def test_readings_of_meters_count(bench, alone):
+def test_readings_of_meters_count(bench, alone, tmp_path):
     """The same presses with and without them: R, C and stray of the specimen are known better, and still right."""
     (c1, d1), (c2, d2) = (meter(TRUTH, f) for f in (1.1e3, 19.9e3))
     for words in (
@@ -241,7 +247,7 @@ def test_readings_of_meters_count(bench, alone):
         ("--C", f"{c2:.6g}pF@19.9kHz", "--D", f"{d2:.6g}@19.9kHz"),
     ):
         assert bench("log", "add", "S1", *words, "--instrument", "HP 4284A").code == 0
-    both = json.loads(bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json").out)
+    both = quickly(tmp_path)
     assert any("2 readings of meters count" in note for note in both["notes"])
     truth_pf = 64.256829 * np.exp(TRUTH.capacitance)
     one = told(both, "capacitance")

@@ -57,7 +57,7 @@ def made(**changes):
     return design.make({**yamlfile.parse(DESIGN, "design"), **changes})
 
 
-def test_from_an_empty_folder_to_files_for_a_print(run, unpressed):
+def test_from_an_empty_folder_to_files_for_a_print(run, roughly):
     for words in (("material", "eel"), ("shape", "zig"), ("printer", "mine"), ("quality", "mid"), ("design", "my")):
         assert run("new", *words).code == 0
     assert run("pack", "trust", ".").code == 0
@@ -650,6 +650,7 @@ def test_the_commands_of_the_page(run, here):
 
 
 @pytest.mark.usefixtures("at_rest", "shared_cache")
+@pytest.mark.usefixtures("roughly")
 def test_a_synced_log_is_reported_where_its_shape_is_not_trusted(run, here, monkeypatch):
     """Nothing of it runs; the report is of all else, and names what to trust, by the file's own SHA-256."""
     shape = put(here, "shape", "zig")
@@ -675,6 +676,7 @@ def test_a_synced_log_is_reported_where_its_shape_is_not_trusted(run, here, monk
 
 
 @pytest.mark.usefixtures("at_rest", "shared_cache")
+@pytest.mark.usefixtures("roughly")
 def test_a_synced_log_is_reported_whole_once_its_shape_is_trusted(run, here, monkeypatch):
     shape = put(here, "shape", "zig")
     Path("z.yaml").write_text("shape: zig\n", "utf-8")

@@ -71,9 +71,8 @@ def test_a_run_ends_with_the_tip_up_when_its_guardian_dies(tmp_path, rig):
     assert rig.state()["tip_mm"] >= 1.0
 
 
-@pytest.mark.parametrize("number", [
-    signal.SIGTERM, *(pytest.param(each, marks=pytest.mark.nightly) for each in (signal.SIGINT, signal.SIGHUP))
-])  # fmt: skip
+@pytest.mark.nightly  # faster, in one process: test_run
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_signals_end_a_run_with_the_tip_up_and_the_log_closed(tmp_path, rig, number):
     run = _pressing(tmp_path, rig)
     os.kill(run.process.pid, number)

@@ -1,6 +1,8 @@
 """A run from begin to end: what it records, how it is paused, ended, resumed, and what it says of itself."""
 
 import json
+import os
+import signal
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +21,7 @@ from sensorgen.measure.lab.experiment import Choice
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.bench import read_again
 from sensorgen.measure.signal.run import processed
+from sensorgen.measure.virtual.mechanics import VirtualRig
 
 
 @dataclass
@@ -271,6 +274,26 @@ def test_the_command_runs_simulates_and_resumes(tmp_path, shared_cache):
     assert again.exception is None
     assert (again.return_value, "2 of 2 presses, simulated" in again.stdout) == (0, True)
     assert "all of it is done" in str(_cli("--resume", result["folder"], "--log", log).exception)
+
+
+def test_a_signal_ends_a_run_with_the_tip_up_and_the_log_closed(tmp_path, monkeypatch, shared_cache):
+    """Under a press, on the simulated clock; other signals, to a process of their own, by night (test_kills)."""
+    rigs, advance = [], VirtualRig.advance
+
+    def signalled(rig, time_s):
+        advance(rig, time_s)
+        if rig.force_n >= 3 and not rigs:
+            rigs.append(rig)
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setattr(VirtualRig, "advance", signalled)
+    found = _cli(_file(tmp_path), "--simulate", "--log", tmp_path / "log.db", "--json")
+    result = json.loads(found.stdout)
+    assert (found.return_value, result["end"], result["done"], result["tip_up"]) == (1, "abort", 0, True)
+    assert "SIGTERM" in result["reason"]
+    assert rigs[0].tip_mm >= 1.0
+    with Log(tmp_path / "log.db") as log:
+        assert len(log.recordings()) == 1
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ BATCH = {
 }
 
 
+@pytest.mark.usefixtures("roughly")
 def test_a_day_at_the_bench(run, path, tmp_path, monkeypatch):
     monkeypatch.setenv("PYVISA_LIBRARY", f"{Path(__file__).with_name('meters.yaml')}@sim")
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)

@@ -123,6 +123,7 @@ def test_lists(run, path):
     assert listed[-1] == str(path)
 
 
+@pytest.mark.usefixtures("roughly")
 def test_a_prediction_is_kept_when_it_is_made(run, path):
     first = run("predict", "tri", "--dielectric", "0.1")
     assert "prediction 1: design trix-d0.1" in first.words
@@ -138,6 +139,7 @@ def test_a_prediction_is_kept_when_it_is_made(run, path):
     assert "is sound: 3 rows" in run("verify").out
 
 
+@pytest.mark.usefixtures("roughly")
 def test_a_prediction_ahead_of_the_measurement(run, path, tmp_path):
     said = run("multimeter", "26 triX .1mm", "--y", "650", "--predict")
     assert (said.code, said.err) == (0, "")

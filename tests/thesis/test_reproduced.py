@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from sensorgen.verification import thesis
+from sensorgen.verification.thesis.checks import press
 from sensorgen.verification.thesis.items import ThesisItem
 from sensorgen.verification.thesis.reproduced import ReproducedItem, row
 from sensorgen.verification.thesis.verdicts import (
@@ -21,6 +22,8 @@ from sensorgen.verification.thesis.verdicts import (
     ItemPart,
     compared,
 )
+
+from .conftest import RECT, solved
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -107,6 +110,14 @@ def test_numbers_of_the_errata_come_out(rows):
     assert parts["Figure 6.5", "displacement at 100 kPa, film 0.1 mm"].ours == pytest.approx(33.12e-6, rel=0.01, abs=0)
     rise = parts["Figure 6.12", "(a) rise at 100 kPa, 2 mm by 20 mm"].ours
     assert rise == pytest.approx(52.5e-12 * 0.02, rel=0.011, abs=0)
+
+
+@pytest.mark.nightly
+def test_the_stored_curve_of_the_rectangular_cell_is_that_of_the_solver(monkeypatch):
+    monkeypatch.setattr(press.compressed, "answer", solved)
+    found = press._pressed("rect", parameters={"dielectric_mm": 0.1})
+    for name in ("displacement_um", "lower_f_per_m2", "upper_f_per_m2"):
+        assert getattr(found, name) == pytest.approx(getattr(RECT, name), rel=1e-6, abs=0)
 
 
 def test_a_confined_plate_gives_way_by_its_bulk(rows):

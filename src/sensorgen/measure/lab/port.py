@@ -131,11 +131,12 @@ class SimulatedPort:
     def read_until(self, end: bytes, timeout_s: float) -> bytes:
         """Received bytes up to and including an end, fewer when the time is over [s]."""
         until = self._clock.now() + timeout_s
-        with faults(self.address):
-            self._received += self._simulator.exchange(b"", self._clock.now())
-            while end not in self._received and self._clock.now() < until:
-                self._clock.wait_until(min(until, self._clock.now() + self._step_s))
+        while end not in self._received:
+            with faults(self.address):
                 self._received += self._simulator.exchange(b"", self._clock.now())
+            if end in self._received or self._clock.now() >= until:
+                break
+            self._clock.wait_until(min(until, self._clock.now() + self._step_s))
         return _taken(self._received, end)
 
     def close(self) -> None:

@@ -128,7 +128,7 @@ class Watch:
         if len(self._course) < _FEWEST_COURSE:
             return ""
         admittance = 1 / np.array(self._course)
-        middle: Complex = np.median(admittance.real, axis=0) + 1j * np.median(admittance.imag, axis=0)
+        middle: Complex = np.median(admittance.view(float), axis=0).view(complex)  # of real and imaginary part
         return circuit(self.tones_hz, np.asarray(1 / middle))
 
     def mean(self) -> Complex:

@@ -138,12 +138,11 @@ class SmacController(Simulator):
             return 0x2E
         if what == 0x32C05:
             return self._macros.get((self._objects[0x12C05], self._objects[0x22C05]), 0xFFFFFFF1FFFFFFFF)
-        live = {
-            0x6041: self._status(),
-            0x6064: round((self._plant.extension_mm - self._zero_mm) / self._mm),
-            0x6077: round(self._plant.motor_n / self._newton),
-        }
-        return live.get(what, self._objects.get(what, 0))
+        if what == 0x6041:
+            return self._status()
+        if what == 0x6064:
+            return round((self._plant.extension_mm - self._zero_mm) / self._mm)
+        return round(self._plant.motor_n / self._newton) if what == 0x6077 else self._objects.get(what, 0)
 
     def _say(self, what: int, value: int) -> None:
         """One answer, as the planted fault has it."""
