@@ -350,4 +350,11 @@ def follow(
 def _words(feed: FrameFeed, live: "LiveMaps", press: "NamedPress | None") -> dict[str, Any]:
     by = live.plan.words() if live.tared else "not tared: unload the array, and press Unloaded"
     recording = None if feed.recorder is None else feed.recording
-    return {"by": by, "press": press.shown() if press else None, "paused": feed.paused, "recording": recording, **feed.counts, "skipped": live.dropped}
+    return {
+        "by": by,
+        "press": press.shown() if press else None,
+        "paused": feed.paused,
+        "recording": recording,
+        **feed.counts,
+        "skipped": live.dropped,
+    }
