@@ -210,6 +210,6 @@ def test_lines_of_every_direction_unite_to_what_geos_unites(degrees):
 def test_slits_are_closed_up_to_their_width(apart, area):
     """Lines 0.4 mm wide with a slit of 0.03 mm are one rectangle, with one of 0.05 mm two, where 0.04 mm are closed."""
     start = np.array([[0.0, 0.0], [0.0, apart]])
-    lines = shapely.linestrings(np.stack([start, start + [10.0, 0.0]], axis=1))
+    lines = shapely.linestrings(np.stack([start, start + np.array([10.0, 0.0])], axis=1))
     plans = shapely.buffer(lines, 0.2 + 0.02, cap_style="flat")
     assert _narrowed(plans, 0.02, np.array([[10.0, 0.0]] * 2)).area == pytest.approx(area, rel=1e-2)

@@ -332,7 +332,7 @@ class ElementLaw:
         return np.where(known, mean, np.nan), np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)
 
     def slopes(self, session: ArraySession, tare: "Real | None" = None) -> Real:
-        """Slope of the pressure by the reading, past apart, (k, n); of a missing reading that at rest [kPa per unit]."""
+        """Slope of the pressure by the reading, past apart, (k, n); that at rest of a missing one [kPa per unit]."""
         zero = (session.tare if tare is None else tare) if self.form.tared else 0.0
         x, first = np.nan_to_num(session.reading - zero) / self.scale, 0 if self.form.tared else 1
         rates = (k * self.at[:, first + k - 1] * x ** (k - 1) for k in range(1, self.form.powers + 1))
