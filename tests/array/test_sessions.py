@@ -122,6 +122,16 @@ def test_gains_come_back_from_every_reference(reference):
     assert np.abs(law.pressures(other)[0] - other.pressure_kpa).max() < 5
 
 
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_noise_is_not_widened_as_scatter_of_sessions_is(count):
+    """90 % of normal noise of 0.5 lie within 1.645 times 0.5 and the gain, of however many sessions it is known."""
+    kpa = np.concatenate([np.zeros((1000, 5)), loads(400, 4)[1:]])
+    each = [replace(made(kpa, noise=0.5, seed=k), time_s=np.arange(len(kpa)) / 50) for k in range(count + 1)]
+    mean, half = calibrated(each[1:], LawForm(powers=1)).pressures(each[0])
+    assert half[1000:].mean() == pytest.approx(1.645 * 0.5 * GAINS.mean(), rel=0.05)
+    assert (np.abs(mean - kpa) < half)[1000:].mean() == pytest.approx(0.9, abs=0.02)
+
+
 def test_an_element_without_data_takes_the_print_s_gain():
     """Mean and spread over the print, as of any hierarchical prior: 2.06 +- 0.11 of the other four."""
     known = made(loads(40, 2), noise=0.05)

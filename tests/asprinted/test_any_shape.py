@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from sensorgen.asprinted import window
-from sensorgen.asprinted.beads import Beads, _closed, layers
+from sensorgen.asprinted.beads import Beads, _narrowed, layers
 from sensorgen.asprinted.printed import gap_mm
 from sensorgen.checks import estimate
 from sensorgen.design import shape_files
@@ -199,7 +199,17 @@ def test_lines_of_every_direction_unite_to_what_geos_unites(degrees):
     angle = np.radians(np.where(np.arange(500) < 400, degrees, degrees + 90))
     way = np.column_stack([np.cos(angle), np.sin(angle)]) * np.where(np.arange(500) < 400, 8.0, 2.0)[:, None]
     start = rng.uniform(0, 60, (500, 2))
-    plans = shapely.buffer(shapely.linestrings(np.stack([start, start + way], axis=1)), 0.25, quad_segs=4)
-    united, other = _closed(plans, 1e-6, way), shapely.union_all(plans)
+    lines = shapely.linestrings(np.stack([start, start + way], axis=1))
+    plans, wider = (shapely.buffer(lines, 0.25 + more, quad_segs=4) for more in (0.0, 1e-6))
+    united, other = _narrowed(wider, 1e-6, way), shapely.union_all(plans)
     assert shapely.symmetric_difference(shapely.make_valid(united), other).area < 1e-3
     assert united.area == pytest.approx(other.area, rel=1e-6)
+
+
+@pytest.mark.parametrize(("apart", "area"), [(0.43, 10 * 0.83), (0.45, 2 * 10 * 0.4)])
+def test_slits_are_closed_up_to_their_width(apart, area):
+    """Lines 0.4 mm wide with a slit of 0.03 mm are one rectangle, with one of 0.05 mm two, where 0.04 mm are closed."""
+    start = np.array([[0.0, 0.0], [0.0, apart]])
+    lines = shapely.linestrings(np.stack([start, start + np.array([10.0, 0.0])], axis=1))
+    plans = shapely.buffer(lines, 0.2 + 0.02, cap_style="flat")
+    assert _narrowed(plans, 0.02, np.array([[10.0, 0.0]] * 2)).area == pytest.approx(area, rel=1e-2)

@@ -10,7 +10,7 @@ from served_frames import HERTZ, Device, lines, walker
 from in_process import run, run_all
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import load
-from sensorgen.measure.array_frames import read
+from sensorgen.measure.array_frames import read, swapped
 from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock
 from sensorgen.measure.lab.frame_live import FrameFeed, MapView, NamedPress, follow, recorder
 from sensorgen.measure.lab.frame_stream import FrameForm, FrameStream
@@ -276,7 +276,14 @@ def test_a_known_press_names_swapped_wires(model, order, words):
         press.take(live.take(siemens[lot], lot / 100, rest[lot]))
         if lot[-1] < REST + 20:
             assert not press.words()
+            assert press.shown()["words"].startswith("press r2c3: ")
     assert press.words().startswith(words)
+    assert press.shown() == {"at": (1, 2), "words": press.words(), "swapped": "swapped" in words}
+
+
+def test_a_swapped_row_and_a_swapped_column_are_both_named():
+    pressed, largest = (np.repeat([[row], [column]], 20, axis=1) for row, column in ((2, 1), (4, 6)))
+    assert swapped(pressed, largest).startswith("presses on r3 are read at r5, on c2 are read at c7: wires swapped")
 
 
 def test_the_command_names_swapped_wires_and_refuses_crossings_that_are_not_there(folder):

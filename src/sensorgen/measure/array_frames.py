@@ -355,16 +355,15 @@ def swapped(pressed: Whole, largest: Whole) -> str:
     pressed, largest : (2, k) array
         Row and column of each press, and of its largest reading, from 0.
     """
+    apart = list[str]()
     for letter, own, read_at in zip("rc", pressed, largest, strict=True):
         for track in np.unique(own[own != read_at]).tolist():
             at = read_at[own == track]
             other = int(np.bincount(at).argmax())
             if other != track and np.mean(at == other) > _MOST:
-                return (
-                    f"presses on {letter}{track + 1} are read at {letter}{other + 1}: wires swapped; "
-                    "exchange them, or name the press right"
-                )
-    return ""
+                apart.append(f"{letter}{track + 1} are read at {letter}{other + 1}")
+                break
+    return f"presses on {', on '.join(apart)}: wires swapped; exchange them, or name the press right" if apart else ""
 
 
 def _session(

@@ -68,10 +68,15 @@ class _Pieces:
 
     def touching(self) -> Whole:
         """Pairs of pieces (2, n) that touch."""
-        one, other = shapely.STRtree(self.outlines).query(self.outlines, predicate="dwithin", distance=SLIVER_MM)
+        x0, y0, x1, y1 = shapely.bounds(self.outlines).T
+        boxes = shapely.box(x0 - SLIVER_MM, y0 - SLIVER_MM, x1 + SLIVER_MM, y1 + SLIVER_MM)
+        one, other = shapely.STRtree(self.outlines).query(boxes)
         low, high = self.spans_mm.T
         meet = (low[one] < high[other] + SLIVER_MM) & (low[other] < high[one] + SLIVER_MM) & (one < other)
-        return np.stack([one[meet], other[meet]])
+        one, other = one[meet], other[meet]
+        shapely.prepare(self.outlines)
+        near = shapely.dwithin(self.outlines[one], self.outlines[other], SLIVER_MM)
+        return np.stack([one[near], other[near]])
 
     def terminals(self) -> tuple[list[str], list[tuple[int, int]], int]:
         """Terminal of each piece, pairs of pieces that short two of them, and how many connected pieces float."""

@@ -242,12 +242,14 @@ def outlines(region: Region) -> Iterator[Outline]:
 
 def _cut_at(part: Polygon) -> float | None:
     """Where to cut a polygon that is rectilinear or has holes; None where it is neither."""
-    if part.interiors:
-        hole = part.interiors[len(part.interiors) // 2]  # halves of many holes are cut sooner than one after the other
-        return float(hole.bounds[0] if is_rectilinear(part) else hole.centroid.x)
-    x = shapely.get_coordinates(part)[:, 0]
+    corners, holes = shapely.get_coordinates(part), shapely.get_num_interior_rings(part)
+    slanted = np.count_nonzero(np.abs(np.diff(corners, axis=0)).min(1) >= SLIVER_MM)  # ways between rings among them
+    if holes:
+        hole = shapely.get_interior_ring(part, holes // 2)  # halves of many are cut sooner than one after the other
+        return float(hole.bounds[0] if slanted <= holes and is_rectilinear(part) else hole.centroid.x)
+    x = corners[:, 0]
     inside = x[(x > part.bounds[0] + SLIVER_MM) & (x < part.bounds[2] - SLIVER_MM)]
-    return float(inside.min()) if is_rectilinear(part) and len(inside) else None
+    return float(inside.min()) if not slanted and len(inside) else None
 
 
 @dataclass(frozen=True)

@@ -262,13 +262,26 @@ class NamedPress:
             if len(self._read) < PRESS_FRAMES and peak[place] > _SIGMAS * sigma[place]:
                 self._read.append(np.array(place))
 
-    def words(self) -> str:
-        """Wires that are swapped, or that none are; "" before it has been pressed for long enough."""
+    def fault(self) -> str:
+        """Wires that are swapped; "" where none are, or before it has been pressed for long enough."""
         if len(self._read) < PRESS_FRAMES:
             return ""
-        places = np.transpose(self._read)
         pressed = np.repeat(np.array(self.at)[:, None], len(self._read), axis=1)
-        return swapped(pressed, places) or f"the press on r{self.at[0] + 1}c{self.at[1] + 1} is read there"
+        return swapped(pressed, np.transpose(self._read))
+
+    def words(self) -> str:
+        """Wires that are swapped, or that none are; "" before it has been pressed for long enough."""
+        done = f"the press on {self._name} is read there" if len(self._read) >= PRESS_FRAMES else ""
+        return self.fault() or done
+
+    def shown(self) -> dict[str, Any]:
+        """Place, request or result, and whether wires are swapped, for the page."""
+        request = f"press {self._name}: {len(self._read)} of {PRESS_FRAMES} frames"
+        return {"at": self.at, "words": self.words() or request, "swapped": bool(self.fault())}
+
+    @property
+    def _name(self) -> str:
+        return f"r{self.at[0] + 1}c{self.at[1] + 1}"
 
 
 class MapView(LiveView):
@@ -333,6 +346,12 @@ def follow(
 
 def _words(feed: FrameFeed, live: "LiveMaps", press: "NamedPress | None") -> dict[str, Any]:
     by = live.plan.words() if live.tared else "not tared: unload the array, and press Unloaded"
-    by = "; ".join(filter(None, (press.words() if press else "", by)))
     recording = None if feed.recorder is None else feed.recording
-    return {"by": by, "paused": feed.paused, "recording": recording, **feed.counts, "skipped": live.dropped}
+    return {
+        "by": by,
+        "press": press.shown() if press else None,
+        "paused": feed.paused,
+        "recording": recording,
+        **feed.counts,
+        "skipped": live.dropped,
+    }

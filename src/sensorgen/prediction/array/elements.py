@@ -331,6 +331,13 @@ class ElementLaw:
         known = np.isfinite(session.reading) & self.alive & (np.isfinite(zero) | (not self.form.tared))
         return np.where(known, mean, np.nan), np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)
 
+    def slopes(self, session: ArraySession, tare: "Real | None" = None) -> Real:
+        """Slope of the pressure by the reading, past apart, (k, n); that at rest of a missing one [kPa per unit]."""
+        zero = (session.tare if tare is None else tare) if self.form.tared else 0.0
+        x, first = np.nan_to_num(session.reading - zero) / self.scale, 0 if self.form.tared else 1
+        rates = (k * self.at[:, first + k - 1] * x ** (k - 1) for k in range(1, self.form.powers + 1))
+        return np.asarray(np.exp(self.drift * (session.day - self.day)) / self.scale * sum(rates))
+
 
 def scale_of(sessions: Sequence[ArraySession], form: LawForm) -> float:
     """Median over elements of the span of their readings, so that the terms are near 1."""

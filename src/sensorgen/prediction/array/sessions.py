@@ -78,7 +78,11 @@ class ArrayCalibration:
     def pressures(self, session: ArraySession, tare: "Real | None" = None) -> tuple[Real, Real]:
         """Pressures, and half-widths of their intervals, (k, n); nan of dead elements and missing readings [kPa]."""
         mean, by_law = self.law.pressures(session, tare)
-        return mean, self.reach * np.sqrt(by_law**2 + self.floor_kpa**2 + (self.share * mean) ** 2)
+        own = self.floor_kpa**2 + (self.share * mean) ** 2
+        noise = (self.quiet * self.law.slopes(session, tare)) ** 2
+        # One more session, by a scatter that so few tell; noise is the same in all, and known of many frames.
+        of_session = np.maximum(own - noise, 0.0) / len(self.tares)
+        return mean, self.reach * np.sqrt(by_law**2 + own + of_session)
 
     def of_ratio(
         self, ratio: Real, time_s: Real, day: float, past: "Past | None" = None
@@ -277,7 +281,6 @@ def calibrated(sessions: Sequence[ArraySession], form: "LawForm | None" = None) 
         return ArrayCalibration(law, 0.0, 0.0, NORMAL_90, common, tares, quiet, names)
     floor, share = _scale(np.maximum(off**2 - sigma**2, 0.1 * off**2), mean)
     reach = float(np.quantile(np.abs(off) / np.sqrt(sigma**2 + floor**2 + (share * mean) ** 2), LEVEL))
-    reach *= float(np.sqrt(1 + 1 / len(sessions)))  # one more session, by a scatter that so few tell
     return ArrayCalibration(law, floor, share, reach, common, tares, quiet, names)
 
 
@@ -360,7 +363,7 @@ class CalibrationStudy:
         yield "law", f"{law.form.words()}{drift}; gain differs between elements by {scatter:.2g} %"
         own = (
             f"{known.floor_kpa:.3g} kPa and {100 * known.share:.2g} % of the pressure, interval of {LEVEL:.0%}: "
-            f"{known.reach:.3g} times that"
+            f"{known.reach:.3g} times that, of what is no noise {np.sqrt(1 + 1 / len(self.sessions)):.3g} times more"
             if known.floor_kpa
             else "of one element not known, by total forces alone; expected a bladder or presses too"
         )

@@ -47,6 +47,20 @@ function drawMap() {
     pen.fillStyle = colour(value / page.most);
     pen.fillRect(...at);
   }));
+  pen.fillStyle = ink;
+  pen.font = `${Math.max(9, Math.min(12, 0.5 * pitch[1] * scale))}px system-ui, sans-serif`;
+  pen.textAlign = "center";
+  pen.textBaseline = "middle";
+  const every = side => Math.max(1, Math.ceil(24 / (side * scale)));  // of a name, in pixels
+  y.forEach((at, i) => { if (i % every(pitch[1]) === 0) pen.fillText(`r${i + 1}`, px(x[0] - pitch[0]), py(at)); });
+  x.forEach((at, j) => { if (j % every(pitch[0]) === 0) pen.fillText(`c${j + 1}`, px(at), py(y[0] - pitch[1])); });
+  const press = page.state && page.state.press;
+  if (press) {
+    const [i, j] = press.at;
+    pen.strokeStyle = style.getPropertyValue(press.swapped ? "--stop" : "--measured").trim();
+    pen.lineWidth = 3;
+    pen.strokeRect(px(x[j] - pitch[0] / 2), py(y[i] + pitch[1] / 2), pitch[0] * scale - 1, pitch[1] * scale - 1);
+  }
   pen.strokeStyle = ink;
   pen.lineWidth = 1.5;
   pen.beginPath();
@@ -73,6 +87,9 @@ function show() {
   const state = page.state, row = page.rows[page.rows.length - 1];
   if (state) {
     byId("message").textContent = state.by;
+    byId("press").hidden = !state.press;
+    byId("press").textContent = state.press ? state.press.words : "";
+    byId("press").className = state.press && state.press.swapped ? "swapped" : "";
     byId("frames").textContent = state.frames;
     byId("lost").textContent = `${state.lost}, ${state.damaged}` + (state.saturated ? `; ${state.saturated} saturated` : "");
     byId("dropped").textContent = state.dropped + state.skipped;
