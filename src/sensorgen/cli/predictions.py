@@ -82,7 +82,7 @@ def predict_command(
     plot : DIR
         Draw R, X, sensitivities and inverse maps there, as PNG and HTML.
     details
-        Also print impedance, a perfect model's resolution, what would improve it, error budget.
+        Also print impedance, a perfect model's resolution, remedies, error budget.
     """
     from sensorgen.prediction.results import Prediction
 
