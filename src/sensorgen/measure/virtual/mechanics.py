@@ -53,8 +53,6 @@ class Mechanics:
         Of the piston [mm].
     force_limit_n : float
         Force on the specimen above which a violation is noted [N].
-    clock_skew, latency_s : float
-        Of the instruments' clocks, relative, and time after which their readings come [-], [s]; for the simulators.
     """
 
     weight_n: float = 0.9
@@ -66,8 +64,6 @@ class Mechanics:
     clearance_mm: float = 30.0
     stroke_mm: float = 50.0
     force_limit_n: float = 8.0
-    clock_skew: float = 0.0
-    latency_s: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse a mechanism that cannot move."""
@@ -75,8 +71,8 @@ class Mechanics:
         for name in above:
             if not getattr(self, name) > 0:
                 raise BadInput(f"{name} of a virtual rig is {getattr(self, name):g}; expected a number above 0")
-        if not (self.weight_n >= 0 and self.friction_n >= 0 and self.latency_s >= 0):
-            raise BadInput("weight, friction and latency of a virtual rig; expected numbers from 0 on")
+        if not (self.weight_n >= 0 and self.friction_n >= 0):
+            raise BadInput("weight and friction of a virtual rig; expected numbers from 0 on")
 
 
 @dataclass
