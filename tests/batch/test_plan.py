@@ -61,6 +61,13 @@ def test_a_plan_fills_in_the_quality_and_printer_that_its_designs_leave_open(pla
     assert (own.design.layers.name, own.design.machine.name) == ("extrafine", "prusa-xl5")
 
 
+def test_a_design_that_a_plan_leaves_as_it_is_keeps_its_name(plan, tmp_path):
+    (tmp_path / "finger.yaml").write_text("shape: tri\nname: finger\nparameters: {length_mm: 36}\n")
+    for quality, is_own in (("fine", True), ("extrafine", False)):
+        (piece,) = read(plan(f"quality: {quality}\n" + HEAD + "  - {design: finger.yaml}\n"))
+        assert (piece.design.name == "finger", piece.design.layers.name) == (is_own, quality)
+
+
 def test_a_shape_that_the_thesis_does_not_have_is_called_by_its_own_name(plan):
     (piece,) = read(plan(HEAD + "  - {shape: pillar}\n"))
     assert piece.name == "26 pillar .2mm 1 fine"

@@ -2,6 +2,7 @@
 
 import difflib
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
@@ -114,7 +115,7 @@ class BatchPlan(Strict):
         return sum(item.replicates for item in self.designs)
 
     def design(self, item: Item, folder: Path) -> Design:
-        """The design of an item, printed as the plan says.
+        """The design of an item, printed as the plan says; one that this makes another design loses its name.
 
         Raises
         ------
@@ -125,9 +126,14 @@ class BatchPlan(Strict):
         over = {key: value for key in ("printer", "quality") if (value := getattr(self, key)) and not data.get(key)}
         if self.tools:
             over["tools"] = _over(data.get("tools", {}), self.tools)
-        if any(data.get(key) != value for key, value in over.items()):
-            data = {key: value for key, value in (data | over).items() if key != "name"}
-        return design_files.make(packs.with_files(data, folder))
+        if all(data.get(key) == value for key, value in over.items()):
+            return design_files.make(packs.with_files(data, folder))
+        changed = {key: value for key, value in (data | over).items() if key != "name"}
+        made = design_files.make(packs.with_files(changed, folder))
+        with suppress(SensorgenError):  # it may need what the plan says
+            own = design_files.make(packs.with_files(data, folder))
+            made = own if own.id() == made.id() else made
+        return made
 
 
 def load(path: Path) -> BatchPlan:
