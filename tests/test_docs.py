@@ -105,7 +105,7 @@ def test_every_command_of_the_pages_has_its_options(line, here, monkeypatch):
 
 
 def specimen_on_a_bench(command, folder, sensorgen):
-    """What ``calibrate S1`` and ``invert S1`` start from: known presses in the log, readings beside it."""
+    """Start of ``calibrate S1`` and ``invert S1``: known presses in the log, readings beside it."""
     lcr, rig = virtual_specimen.recorded(virtual_specimen.drawn(1), folder, 12)
     sensorgen("log", "specimen", "S1", "--design", "flat-tri.yaml")
     sensorgen("log", "bench", "S1", lcr, rig)

@@ -54,7 +54,7 @@ def after(bench, tmp_path, monkeypatch):
 
 
 def quickly(folder):
-    """What ``calibrate S1`` says as JSON, of no press that is held back: the record of ``made`` tells of these."""
+    """Record of a calibration as ``calibrate S1 --json`` prints it; no press is held back: ``made`` has these."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(calibration, "held_out", lambda *_: None)
         patch.setenv("SENSORGEN_LOG", str(folder / "log.db"))
