@@ -21,7 +21,7 @@ import numpy as np
 from sensorgen.core.arrays import Real, Whole
 
 _STIFF = 1e6  # in the tangent of an incompressible element, the pressure's stiffness over mu
-_CHUNK = 2**19  # entries of element matrices at once: they stay in the cache
+_CHUNK = 2**17  # entries of element matrices at once: with what they are made of they stay in a core's cache
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,25 @@ class ElementReference:
     weights: Real
     pressures: Real
     values: Real
+
+    @cached_property
+    def flat(self) -> Real:
+        """Gradients, points and directions in one (q d, n)."""
+        return np.ascontiguousarray(self.gradients.transpose(0, 2, 1)).reshape(-1, self.gradients.shape[1])
+
+    @cached_property
+    def _products(self) -> Real:
+        """Products of two gradients at each point (q d d, n n)."""
+        products = np.einsum("qna,qmb->qabnm", self.gradients, self.gradients)
+        return np.asarray(products.reshape(-1, self.gradients.shape[1] ** 2))
+
+    def forms(self, weights: Real) -> Real:
+        """Quadratic forms (m, n, n) of gradients by weights (m, q, d, d) at the points of each element."""
+        m, q, d, n = *weights.shape[:3], self.gradients.shape[1]
+        if d == 2:  # one product of all elements: triangles have few points
+            return np.asarray((weights.reshape(m, -1) @ self._products).reshape(m, n, n))
+        there = np.matmul(weights, self.flat.reshape(q, d, n)).reshape(m, -1, n)
+        return np.asarray(np.matmul(self.flat.T, there))
 
 
 def triangle_gradients(at: Real) -> Real:
@@ -284,7 +303,7 @@ class Elements:
             here = slice(k, k + step)
             residual, matrix = self.full(u, inner, here)
             inside = np.concatenate([matrix[:, outer:, :outer], residual[:, outer:, None]], axis=2)
-            solved = np.linalg.solve(matrix[:, outer:, outer:], inside)
+            solved = np.linalg.inv(matrix[:, outer:, outer:]) @ inside  # of 5 x 5: half of the time of solving
             taken = np.matmul(matrix[:, :outer, outer:], solved)
             yield Tangent(
                 matrix[:, :outer, :outer] - taken[..., :-1],
@@ -300,16 +319,15 @@ class Elements:
         h, w, volume = self._stretch(u, inner, which), self._weights[which], self._volumes[which, None]
         table, metric = self.mesh.reference, self._metric[which, None]
         m, d, n = len(w), h.shape[-1], table.gradients.shape[1]
-        g = np.ascontiguousarray(table.gradients.transpose(0, 2, 1))  # (q, d, n)
-        flat, size = g.reshape(-1, n), d * n
+        size = d * n
         mu, p = self.law.mu_pa[which, None], inner.pressure[which] @ table.pressures.T
         j, rate = determinant(h) / volume, cofactor(h) / volume[..., None, None]  # det F and its derivative to h
         t, hoops = self._hoops(u, inner, which) if self.mesh.turned else (np.ones_like(j), None)
         hydro = p * t - mu / j
         stress = (w * mu)[..., None, None] * (h @ metric) + (w * hydro)[..., None, None] * rate
-        residual, matrix = np.empty((m, size + d + 1)), np.zeros((m, size + d + 1, size + d + 1))
-        forces = np.matmul(stress.transpose(0, 2, 1, 3).reshape(m, d, -1), flat)
-        residual[:, :size] = forces.transpose(0, 2, 1).reshape(m, size)
+        residual, matrix = np.empty((m, size + d + 1)), np.empty((m, size + d + 1, size + d + 1))
+        forces = stress.transpose(0, 2, 1, 3).reshape(m * d, -1) @ table.flat
+        residual[:, :size] = forces.reshape(m, d, n).transpose(0, 2, 1).reshape(m, size)
         for i in range(d):
             for k in range(i, d):
                 block = (w * mu / j**2)[..., None, None] * rate[:, :, i, :, None] * rate[:, :, k, None, :]
@@ -317,7 +335,7 @@ class Elements:
                     block += (w * mu)[..., None, None] * metric
                 else:
                     block += (w * hydro / volume)[..., None, None] * mixed_minors(h, i, k)
-                part = np.matmul(flat.T, np.matmul(block, g).reshape(m, -1, n))
+                part = table.forms(block)
                 matrix[:, i:size:d, k:size:d] = part
                 matrix[:, k:size:d, i:size:d] = part.transpose(0, 2, 1)
         along = np.matmul(table.gradients, rate.transpose(0, 1, 3, 2)).reshape(m, -1, size)  # dJ to the displacements

@@ -141,7 +141,7 @@ class Problem:
         return np.column_stack([slip @ places for slip in pairs.slips]) - pairs.slid_m
 
     @cached_property
-    def _pattern(self) -> tuple[csr_matrix, Whole, Whole]:
+    def pattern(self) -> tuple[csr_matrix, Whole, Whole]:
         """The elements' stiffness on the free displacements, empty; which of their entries it has, and where."""
         number = np.full(self.free.shape[0], -1)
         number[np.diff(self.free.indptr) > 0] = self.free.indices
@@ -180,7 +180,7 @@ class Problem:
         local, free = self.elements.tangent(u, inner), self.free
         force, stiffness = self.contact_forces(pairs, u)
         force += np.bincount(self.elements.freedoms.ravel(), local.force.ravel(), len(force))
-        empty, inside, place = self._pattern
+        empty, inside, place = self.pattern
         data = np.bincount(place, local.stiffness.ravel()[inside], empty.nnz)
         whole = csr_matrix((data, empty.indices, empty.indptr), empty.shape)
         stiffness = whole + stiffness if stiffness.nnz else whole  # a sum forgets zeros, and the pattern with them

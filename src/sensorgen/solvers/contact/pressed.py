@@ -196,7 +196,7 @@ def solve(
     from sensorgen.solvers.contact.boundary import free_of, top_load
     from sensorgen.solvers.contact.contact import brick_faces_of, faces_of
     from sensorgen.solvers.contact.element import Elements, law
-    from sensorgen.solvers.contact.factors import Solver
+    from sensorgen.solvers.contact.factors import Solver, elimination_order
     from sensorgen.solvers.contact.load import Problem, curve
 
     ramp: list[float] = []
@@ -211,6 +211,7 @@ def solve(
 
         free = free_of(mesh.points_m, boundary)
         problem = Problem(elements, faces, free, load, penalty, stick, sound=sound, settled=_SETTLED, updates=_UPDATES)
+        problem = replace(problem, free=free[:, elimination_order(problem.pattern[0])])
         ramp = [k * longest * softest for k in _FIRST]
     else:
         used = np.isin(np.arange(len(mesh.points_m)), mesh.outer)
