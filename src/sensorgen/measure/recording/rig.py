@@ -14,6 +14,7 @@ error is that of the fit, with the number of independent samples.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -307,7 +308,8 @@ def _responses(rig: RigLog) -> Callable[[Real], Real]:
 
     def responses(at: Real) -> Real:
         f, x = np.interp(at, rows, force), np.interp(at, rows, where)
-        return np.column_stack([*(f**i * x**j for i in (1, 2, 3) for j in (0, 1, 2)), *(term(at) for term in slow)])
+        powers = ((f, f * f, f * f * f), (1.0, x, x * x))  # products: ** takes ten times as long
+        return np.column_stack([*(a * b for a, b in product(*powers)), *(term(at) for term in slow)])
 
     return responses
 

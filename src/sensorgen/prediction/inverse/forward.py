@@ -124,6 +124,7 @@ _SLOPES = np.array([[2.0], [3.0]])  # of the square and the cube
 _FIRST_ORDER = [2, 1]  # by force, by position; the others are the value and the mixed derivative
 _TINY = np.float32(1e-30)
 _SMALL_PRODUCT = 1 << 18  # multiplications up to which BLAS keeps to one thread: more only wait for each other here
+_LOT = 32  # cells compared with all others at once: their distances stay in a core's cache
 
 Float32 = NDArray[np.float32]
 
@@ -215,21 +216,23 @@ class ResponseTable:
         The distance, in units of noise, is the one that is left for a press anywhere in the two cells.
         """
         local = self.at(self.middles)
-        scaled, slopes = local.value / sigma, local.slope[:, 0] / sigma
+        scaled, slopes = (local.value - local.value.mean(axis=0)) / sigma, local.slope[:, 0] / sigma
         reach = np.repeat(np.diff(self.edges[0]), self.shape[1]) / 2
-        curvature = np.einsum("ki,ki->k", slopes, slopes)
+        squares, curvature, level = ((a * b).sum(axis=1) for a, b in ((scaled,) * 2, (slopes,) * 2, (scaled, slopes)))
+        row, column = np.divmod(np.arange(len(scaled)), self.shape[1])
         rival, gap, spacing = np.full(len(scaled), -1), np.full(len(scaled), np.inf), np.zeros(len(scaled))
-        for k, own in enumerate(scaled):
-            off = own - scaled
-            along = np.einsum("ki,ki->k", off, slopes)
+        for start in range(0, len(scaled), _LOT):
+            lot = slice(start, start + _LOT)
+            along = scaled[lot] @ slopes.T - level
             shift = np.clip(along / curvature, -reach, reach)
-            square = np.einsum("ki,ki->k", off, off) - shift * (2 * along - curvature * shift)
-            distance = np.sqrt(np.maximum(square, 0.0)).reshape(self.shape)
-            near, aside = _around(self.shape, k)
-            other = np.where(_minima(distance) & ~near, distance, np.inf)
-            best = int(np.argmin(other))
-            gap[k], spacing[k] = other.flat[best], distance[aside].max()
-            rival[k] = best if gap[k] < np.inf else -1
+            square = squares[lot, None] + squares - 2 * scaled[lot] @ scaled.T - shift * (2 * along - curvature * shift)
+            distance = np.sqrt(np.maximum(square, 0.0))
+            lowest = _minima(distance.reshape(-1, *self.shape)).reshape(distance.shape)
+            rows, columns = abs(row[lot, None] - row), abs(column[lot, None] - column)
+            other = np.where(lowest & (np.maximum(rows, columns) > 1), distance, np.inf)
+            rival[lot], gap[lot] = other.argmin(axis=1), other.min(axis=1)
+            spacing[lot] = np.where((rows == 0) & (columns == 1), distance, 0.0).max(axis=1)
+        rival[gap == np.inf] = -1
         return rival, gap - (spacing + spacing[rival]) / 2
 
 
@@ -310,17 +313,10 @@ def _cubics(values: Real) -> Real:
 
 
 def _minima(distance: Real) -> Mask:
-    """Cells that are below all their neighbours, those at the border among the ones that they have."""
-    around = np.pad(distance, 1, constant_values=np.inf)
-    rows, columns = distance.shape
+    """Cells (..., rows, columns) below all their neighbours, those at the border among the ones that they have."""
+    rows, columns = distance.shape[-2:]
+    around = np.pad(distance, [(0, 0)] * (distance.ndim - 2) + [(1, 1)] * 2, constant_values=np.inf)
     lowest = np.ones(distance.shape, bool)
     for i, j in [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]:
-        lowest &= distance < around[i : i + rows, j : j + columns]
+        lowest &= distance < around[..., i : i + rows, j : j + columns]
     return lowest
-
-
-def _around(shape: tuple[int, int], seed: int) -> tuple[Mask, Mask]:
-    """Cells that touch the seed's, and those among them at the same force."""
-    row, column = divmod(seed, shape[1])
-    rows, columns = abs(np.arange(shape[0]) - row)[:, None], abs(np.arange(shape[1]) - column)
-    return np.maximum(rows, columns) <= 1, (rows == 0) & (columns == 1)
