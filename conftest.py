@@ -190,7 +190,7 @@ def pytest_terminal_summary(terminalreporter):
 
 
 FIRST = (  # longest first, down to ten seconds of work or waiting: a worker that began one last would be left alone
-    "report/test_browser", "test_fit", "lab/test_kills", "cli/test_import_command", "cli/test_predict_command",
+    "report/test_browser", "test_fit", "cli/test_import_command", "cli/test_predict_command",
     "asprinted/test_compensation", "lab/test_faults", "lab/test_run", "cli/test_calibrate_command",
     "cli/test_characterise_command", "asprinted/test_real", "thesis/test_faults", "cli/test_compress_command",
     "test_invert", "test_compression_error", "cli/test_as_printed", "cli/test_writing", "test_one_answer",

@@ -50,6 +50,7 @@ def _pressing(tmp_path, rig):
     raise AssertionError(f"no run came to press: {out}")
 
 
+@pytest.mark.nightly  # faster, the guardian by itself: test_guardian, and nobody's sign of life: test_watchdog
 def test_a_killed_run_leaves_the_tip_up(tmp_path, rig):
     found = killing.killed(rig, _pressing(tmp_path, rig))
     assert found.raised, found

@@ -52,6 +52,12 @@ def test_with_recordings(browser, recorded_page):
     browser.run("scrollTo(0, 0)")
     browser.picture(OUT / "recorded-1920.png", whole=False)
     on_paper(browser)
+    browser.size(360)
+    browser.media("dark", "")
+    browser.until("document.querySelector('.plot').layout.font.color.startsWith('#e')")
+    narrow_and_dark(browser)
+    assert browser.run(f"{FIGURES}.every(f => f[2])")
+    browser.picture(OUT / "recorded-360.png")
     quiet(browser)
 
 
@@ -111,17 +117,6 @@ def narrow_and_dark(browser):
         for which in ("backgroundColor", "color")
     )
     assert max(ground) < 60 < 200 < min(ink)
-
-
-def test_narrow_and_dark(browser, recorded_page):
-    browser.size(360)
-    browser.media("dark")
-    browser.open(recorded_page)
-    narrow_and_dark(browser)
-    assert browser.run("document.querySelector('.plot').layout.font.color").startswith("#e")
-    assert browser.run(f"{FIGURES}.every(f => f[2])")
-    browser.picture(OUT / "recorded-360.png")
-    quiet(browser)
 
 
 def test_readings_alone(browser, tmp_path):
