@@ -1,7 +1,7 @@
 """Equilibrium of a solid with contact under pressure: Newton's method in load steps that are halved where it fails."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -74,6 +74,7 @@ class Problem:
     sound: Callable[[Real], bool] | None = None
     settled: float = 0.05
     updates: int = 4
+    _last: list[tuple[Tangent, Real, csr_matrix]] = field(default_factory=list, repr=False, compare=False)
 
     @property
     def dimension(self) -> int:
@@ -177,14 +178,19 @@ class Problem:
 
     def residual(self, u: Real, inner: Inner, pairs: FacePairs, pressure_pa: float) -> tuple[Real, csr_matrix, Tangent]:
         """Unbalanced forces on the free displacements, their derivative, and the elements' condensed part."""
-        local, free = self.elements.tangent(u, inner), self.free
+        local, inside, whole = self._elastic(self.elements.tangent(u, inner))
         force, stiffness = self.contact_forces(pairs, u)
-        force += np.bincount(self.elements.freedoms.ravel(), local.force.ravel(), len(force))
-        empty, inside, place = self.pattern
-        data = np.bincount(place, local.stiffness.ravel()[inside], empty.nnz)
-        whole = csr_matrix((data, empty.indices, empty.indptr), empty.shape)
         stiffness = whole + stiffness if stiffness.nnz else whole  # a sum forgets zeros, and the pattern with them
-        return free.T @ (force - pressure_pa * self.load), stiffness, local
+        return self.free.T @ (force + inside - pressure_pa * self.load), stiffness, local
+
+    def _elastic(self, local: Tangent) -> tuple[Tangent, Real, csr_matrix]:
+        """Forces of all elements, and their stiffness on the free displacements; the last ones are kept."""
+        if not (self._last and self._last[0][0] is local):
+            empty, inside, place = self.pattern
+            force = np.bincount(self.elements.freedoms.ravel(), local.force.ravel(), len(self.load))
+            data = np.bincount(place, local.stiffness.ravel()[inside], empty.nnz)
+            self._last[:] = [(local, force, csr_matrix((data, empty.indices, empty.indptr), empty.shape))]
+        return self._last[0]
 
     def newton(self, state: State, pressure_pa: float, pairs: FacePairs, enough: float) -> State | None:
         """Equilibrium at a pressure with frozen contact pairs, or None where Newton's method does not converge.
