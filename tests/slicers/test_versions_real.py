@@ -10,7 +10,7 @@ import pytest
 
 from sensorgen.core import yamlfile
 from sensorgen.design import design
-from sensorgen.design.tower import tower
+from sensorgen.design.printer import tower
 from sensorgen.export import slicing
 from sensorgen.export.gcode import paths
 from sensorgen.export.gcode.check import check

@@ -12,7 +12,7 @@ from sensorgen.core import files as store
 from sensorgen.core.errors import BadInput, SlicerFailed, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
-from sensorgen.design.tower import tower
+from sensorgen.design.printer import tower
 from sensorgen.export import threemf
 from sensorgen.export.gcode.drags import Lifted, lift
 from sensorgen.export.gcode.motion import follow

@@ -12,8 +12,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import MissingValue, OutOfRange
-from sensorgen.design.printer import Printer, Quality
-from sensorgen.design.tower import PRIME_MM3, tower
+from sensorgen.design.printer import PRIME_MM3, Printer, Quality, tower
 from sensorgen.export.slicers.loads import Recipe, ToolLoad, by_hand, number, overlaid, recipes, templates
 from sensorgen.export.slicers.versions import Version
 
