@@ -17,7 +17,7 @@ from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, parts
 from sensorgen.scene.scene import SLIVER_MM, Point
 
 if TYPE_CHECKING:
-    from sensorgen.export.gcode.paths import Paths
+    from sensorgen.export.gcode.motion import Paths
 
 CONVENTIONS = ("vol", "deposit", "stadium")
 FULL = 0.95  # a plate of which this share is filled has no holes but between rounded lines

@@ -10,8 +10,8 @@ from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.crossings import CONTACT_MM, crossings
 from sensorgen.export.gcode.drags import habits, retracted
+from sensorgen.export.gcode.motion import tools_of
 from sensorgen.export.gcode.moves import Motion, seconds
-from sensorgen.export.gcode.paths import tools_of
 from sensorgen.export.gcode.results import GcodeFinding
 
 BALANCE_MM = 0.5  # of filament, that a travel may add to the melt in the nozzle or take

@@ -18,7 +18,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
-from sensorgen.export.gcode.paths import Paths
+from sensorgen.export.gcode.motion import Paths
 from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, drawn, parts
 from sensorgen.scene.scene import Point

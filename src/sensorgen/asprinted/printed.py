@@ -27,7 +27,7 @@ from sensorgen.scene.scene import FLOATING, Body, Point, Scene, seen_from_above
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.beads import Beads
-    from sensorgen.export.gcode.paths import Paths
+    from sensorgen.export.gcode.motion import Paths
     from sensorgen.scene.connections import Connected
 from functools import lru_cache
 from itertools import pairwise

@@ -8,9 +8,8 @@ import numpy as np
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design
-from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.motion import Paths, follow, paths_of
 from sensorgen.export.gcode.moves import Motion
-from sensorgen.export.gcode.paths import Paths, paths_of
 from sensorgen.export.gcode.reading import Source
 from sensorgen.scene.scene import Point
 

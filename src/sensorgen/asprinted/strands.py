@@ -14,8 +14,7 @@ from sensorgen.core.document import Column, Part, Table
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.crossings import CONTACT_MM, PrintedLines, crossings, printed_lines
 from sensorgen.export.gcode.drags import summed
-from sensorgen.export.gcode.motion import follow
-from sensorgen.export.gcode.paths import Numbering
+from sensorgen.export.gcode.motion import Numbering, follow
 from sensorgen.export.gcode.reading import Source, text_of
 from sensorgen.export.gcode.results import Drags
 

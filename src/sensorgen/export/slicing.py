@@ -15,11 +15,10 @@ from sensorgen.design.design import Design
 from sensorgen.design.printer import tower
 from sensorgen.export import threemf
 from sensorgen.export.gcode.drags import Lifted, lift
-from sensorgen.export.gcode.motion import follow
-from sensorgen.export.gcode.paths import Paths, paths_of
+from sensorgen.export.gcode.motion import Paths, follow, paths_of
 from sensorgen.export.gcode.reading import text_of
 from sensorgen.export.gcode.ready import ready
-from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, curaengine, prusa, run, versions
+from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, cura, prusa, run, versions
 from sensorgen.export.slicers.loads import ToolLoad, loads
 from sensorgen.export.slicers.run import Runner, find
 from sensorgen.export.threemf.core import part_of, parts_of
@@ -262,18 +261,18 @@ def _run(
         known = prusa.settings(text_of(raw)[-_TAIL:].decode("utf-8", "replace"))
         not_known = prusa.settings(text).keys() - known.keys() if known else set()
     else:
-        settings = curaengine.engine_settings(design.machine, design.layers, all_loads, version)
+        settings = cura.engine_settings(design.machine, design.layers, all_loads, version)
         # The engine primes in the first layer only the tool that prints the skirt: that of what lies on the bed
         lowest = min(bodies, key=lambda part: (part.mesh.vertices_mm[:, 2].min(initial=np.inf), part.extruder))
-        of_skirt = {key: str(lowest.extruder) for key in curaengine.OF_SKIRT if key in settings.common}
+        of_skirt = {key: str(lowest.extruder) for key in cura.OF_SKIRT if key in settings.common}
         settings = replace(settings, common=settings.common | of_skirt)
         shift_mm = np.array([-c for c in design.machine.bed_centre_mm()] + [0.0])
         files = [(folder / f"{part.name}.stl", part) for part in bodies]
         for path, part in files:
             path.write_bytes(run.content(part.mesh, shift_mm))
         before = time.perf_counter()
-        curaengine.slice_bodies([(path, part.extruder) for path, part in files], settings, raw, runner)
-        seconds, not_known = time.perf_counter() - before, curaengine.unknown(settings, program)
+        cura.slice_bodies([(path, part.extruder) for path, part in files], settings, raw, runner)
+        seconds, not_known = time.perf_counter() - before, cura.unknown(settings, program)
     return seconds, not_known
 
 

@@ -16,9 +16,8 @@ from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode.crossings import CONTACT_MM, Crossings, crossings
-from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.motion import Numbering, follow
 from sensorgen.export.gcode.moves import Motion, seconds
-from sensorgen.export.gcode.paths import Numbering
 from sensorgen.export.gcode.reading import Source, text_of
 from sensorgen.export.gcode.results import COUNTED_MM, LIFT_MM, Drags, Lifting, OfLayer, ToolTravel
 

@@ -9,7 +9,7 @@ import numpy as np
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.scene.repetition import raster
 from sensorgen.scene.scene import Body, Scene
-from sensorgen.solvers.electrostatics.corners import exponent
+from sensorgen.solvers.electrostatics.mesh import exponent
 
 RATIO = 0.15  # of a layer's distance from an edge to the next layer's
 _INFINITE = 1 - 1e-6  # exponents of the potential below this: the field is infinite
