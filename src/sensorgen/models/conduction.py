@@ -188,7 +188,7 @@ def _conducting(band: Band) -> Band:
 def _in_space(alone: Scene, axis: str, width: float) -> Iterator[Interval]:
     """Of boxes: bounds that get narrower [1/mm]; none where their cell has too many."""
     from sensorgen.models.fem3d import narrowed, total
-    from sensorgen.solvers.electrostatics.bricks import insulated
+    from sensorgen.solvers.electrostatics.boxes import insulated
 
     at = "xyz".index(axis)
     try:

@@ -27,8 +27,7 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.solvers.contact.bricks import BrickMesh
 from sensorgen.solvers.contact.element import brick_gradients, cofactor, determinant
 from sensorgen.solvers.contact.factors import Factors, factored, iterations, order_of, solved_by_lu
-from sensorgen.solvers.electrostatics.boxes import Element, flux, hats, kron, legendres, potential
-from sensorgen.solvers.electrostatics.bricks import reached
+from sensorgen.solvers.electrostatics.boxes import Element, flux, hats, kron, legendres, potential, reached
 
 _SHUT, _OPEN = 0.25, 0.5  # of a gap's width: below and above, its faces' nodes are opposite each other, or as they are
 _THIN = 0.1  # of a gap's width: its air deforms evenly
