@@ -34,7 +34,7 @@ def why_not_applicable(scene: Scene) -> str | None:
     """Why the model does not apply to a scene, or None."""
     if reason := fem.unmirrored(scene):
         return reason
-    pieces = [piece for body in scene.bodies for piece in body.pieces]
+    pieces = [piece for _, piece in scene.pieces]
     if any(all(piece.is_constant(axis) for piece in pieces) for axis in "xyz"):
         return "its bodies are prisms along one axis: solved by the models of those"
     if find_spec("ngsolve") is None:
@@ -101,9 +101,7 @@ class MirrorWindow:
 
 def _looks(scene: Scene) -> Iterator[Region]:
     """Regions of each material and terminal, at some heights between any two levels."""
-    levels = sorted(
-        {z for body in scene.bodies for piece in body.pieces for z in (*piece.levels_mm(), *piece.span("z"))}
-    )
+    levels = sorted({z for _, piece in scene.pieces for z in (*piece.levels_mm(), *piece.span("z"))})
     spans = [(bottom, top) for bottom, top in pairwise(levels) if top - bottom > SLIVER_MM]
     for bottom, top in spans:
         for share in _CUTS:
@@ -136,7 +134,7 @@ def cell(scene: Scene) -> tuple[MirrorWindow, Repeat, Repeat]:
     x, y = halved((x, y), [shapely.clip_by_rect(r, x.low_mm, y.low_mm, x.high_mm, y.high_mm) for r in looks])
     low = (x.low_mm, y.low_mm, min(z for z, _ in spans["bottom"]))
     high = (x.high_mm, y.high_mm, max(z for _, z in spans["top"]))
-    near = [(body, piece) for body in scene.bodies for piece in body.pieces if _lies_in(piece, low, high)]
+    near = [(body, piece) for body, piece in scene.pieces if _lies_in(piece, low, high)]
     if len(near) > _MOST:
         raise ValueError(f"its cell has {len(near)} bodies; at most {_MOST} are solved")
     materials = (*sorted({body.material for body, _ in near if not body.terminal} - {"air"}), "air")

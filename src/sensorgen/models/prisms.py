@@ -222,7 +222,7 @@ class _Cell:
 @lru_cache(maxsize=8)
 def _cell(scene: Scene) -> _Cell:
     """The cell of a scene; raises ValueError where it is none of upright prisms between two electrodes."""
-    slanted = next((b for b in scene.bodies for p in b.pieces if not p.is_constant("z")), None)
+    slanted = next((b for b, p in scene.pieces if not p.is_constant("z")), None)
     if slanted and is_open(scene) and not any(scene.repeats):
         return _enclosed(scene)
     if slanted:
@@ -245,7 +245,7 @@ def _levels(layers: Sequence[Slab]) -> list[float]:
 
 def _sides(scene: Scene, patterned: Sequence[Region]) -> tuple[Repeat, Repeat]:
     """The repeating part along x and y, by what its regions show, or of boxes by their planes."""
-    if any(scene.repeats) or not all(p.is_box() for body in scene.bodies for p in body.pieces):
+    if any(scene.repeats) or not all(p.is_box() for _, p in scene.pieces):
         x, y = (
             Repeat.of(0.0, scene.size_mm[axis], True, scene.size_mm[axis])
             if scene.repeats[axis]

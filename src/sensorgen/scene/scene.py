@@ -238,6 +238,11 @@ class Scene:
         """Leave out empty bodies."""
         object.__setattr__(self, "bodies", tuple(b for b in self.bodies if b.pieces))
 
+    @property
+    def pieces(self) -> list[tuple[Body, Piece]]:
+        """Each piece with the body that it is of."""
+        return [(body, piece) for body in self.bodies for piece in body.pieces]
+
     def body(self, name: str) -> Body:
         """The body of that name; raises KeyError where there is none."""
         return next(b for b in self.bodies if b.name == name)

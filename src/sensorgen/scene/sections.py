@@ -2,10 +2,10 @@
 
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING
 
 from sensorgen.scene.scene import (
@@ -81,8 +81,14 @@ def square_to(scene: Scene, normal: str) -> list[Section]:
     return _sections(scene, normal) if _is_constant(scene, normal) else []
 
 
+def distinct(values: Iterable[float], near: float) -> list[float]:
+    """Values in order, without those that are no more than ``near`` above the one before."""
+    rising = sorted(values)
+    return rising[:1] + [value for before, value in pairwise(rising) if value - before > near]
+
+
 def _is_constant(scene: Scene, normal: str) -> bool:
-    return all(p.is_constant(normal) for b in scene.bodies for p in b.pieces)
+    return all(p.is_constant(normal) for _, p in scene.pieces)
 
 
 def _through(cuts: list[float], spans: list[tuple[float, float]]) -> list[list[int]]:
@@ -96,18 +102,18 @@ def _through(cuts: list[float], spans: list[tuple[float, float]]) -> list[list[i
 
 def _sections(scene: Scene, normal: str) -> list[Section]:
     across = "x" if normal == "y" else "y"
-    spans = [(p.span(normal), body, p) for body in scene.bodies for p in body.pieces]
-    cuts = sorted({edge for span, _, _ in spans for edge in span})
-    slabs = _through(cuts, [span for span, _, _ in spans])
+    pieces = scene.pieces
+    spans = [p.span(normal) for _, p in pieces]
+    cuts = sorted(set(chain.from_iterable(spans)))
     looks: dict[object, int] = {}
-    look = [looks.setdefault((body.name, shadow(p, normal)), len(looks)) for _, body, p in spans]
+    look = [looks.setdefault((body.name, shadow(p, normal)), len(looks)) for body, p in pieces]
     by_look: dict[tuple[int, ...], tuple[float, float, list[int]]] = {}
-    for (low, high), here in zip(pairwise(cuts), slabs, strict=True):
+    for (low, high), here in zip(pairwise(cuts), _through(cuts, spans), strict=True):
         key = tuple(look[i] for i in here)
         depth, at, members = by_look.get(key, (0.0, (low + high) / 2, here))
         by_look[key] = (depth + high - low, at, members)
     return [
-        Section(across, depth, at, tuple((spans[i][1], o) for i in members for o in spans[i][2].cut(normal, at)))
+        Section(across, depth, at, tuple((pieces[i][0], o) for i in members for o in pieces[i][1].cut(normal, at)))
         for depth, at, members in by_look.values()
     ]
 
@@ -225,26 +231,14 @@ def slabs(scene: Scene, cuts: int = CUTS) -> tuple[Slab, ...]:
 
     Curved faces are those of the bodies' meshes, chords within 0.01 mm.
     """
-    import numpy as np
     import shapely
 
-    upright, slanted = list[tuple[Body, Piece]](), list[tuple[Body, Piece]]()
-    for body, piece in ((b, p) for b in scene.bodies for p in b.pieces):
-        (upright if piece.is_constant("z") else slanted).append((body, piece))
-    heights = [z for _, p in upright for z in p.span("z")]
-    for _, piece in slanted:
-        heights += [*np.linspace(*piece.span("z"), cuts + 1).tolist(), *piece.levels_mm()]
-    levels = np.unique(np.array(heights).round(9))
-    levels = levels[np.append(True, np.diff(levels) > SLIVER_MM)]
-    faces = [_faces(piece) for _, piece in slanted]
+    pieces = sorted(scene.pieces, key=lambda own: not own[1].is_constant("z"))  # upright ones first
+    faces = [None if piece.is_constant("z") else _faces(piece) for _, piece in pieces]
     cut_slabs = []
-    for low, high in pairwise(levels.tolist()):
+    for low, high in pairwise(_levels(scene, cuts)):
         inner, outer = defaultdict[Body, "list[Region]"](list), defaultdict[Body, "list[Region]"](list)
-        for body, piece in upright:
-            if piece.span("z")[0] < (low + high) / 2 < piece.span("z")[1]:
-                inner[body].append(shapely.Polygon(seen_from_above(piece)))
-                outer[body].append(inner[body][-1])
-        for (body, piece), triangles in zip(slanted, faces, strict=True):
+        for (body, piece), triangles in zip(pieces, faces, strict=True):
             if piece.span("z")[0] < (low + high) / 2 < piece.span("z")[1]:
                 least, most = _between(piece, triangles, low, high)
                 inner[body].append(least)
@@ -252,6 +246,18 @@ def slabs(scene: Scene, cuts: int = CUTS) -> tuple[Slab, ...]:
         united = [{b: shapely.union_all(own) for b, own in some.items()} for some in (inner, outer)]
         cut_slabs.append(Slab(low, high, united[0], united[1]))
     return tuple(cut_slabs)
+
+
+def _levels(scene: Scene, cuts: int) -> list[float]:
+    """Heights at which upright pieces begin and end, and others are cut [mm]."""
+    import numpy as np
+
+    heights: list[float] = []
+    for _, piece in scene.pieces:
+        upright = piece.is_constant("z")
+        heights += piece.span("z") if upright else (*np.linspace(*piece.span("z"), cuts + 1), *piece.levels_mm())
+    levels = np.unique(np.array(heights).round(9))
+    return list(levels[np.append(True, np.diff(levels) > SLIVER_MM)].tolist())
 
 
 def covered(scene: Scene, terminal: str) -> bool:
@@ -279,12 +285,15 @@ def _faces(piece: Piece) -> "Real":
     return mesh(Body("", "", (piece,))).corners_mm()
 
 
-def _between(piece: Piece, faces: "Real", low_mm: float, high_mm: float) -> "tuple[Region, Region]":
-    """Regions that a piece covers at all heights between two, and at any: its surface decides where they differ."""
+def _between(piece: Piece, faces: "Real | None", low_mm: float, high_mm: float) -> "tuple[Region, Region]":
+    """Regions that a piece covers at all heights between two, and at any: where they differ, its faces decide."""
     import shapely
 
     from sensorgen.scene.layers import EMPTY
 
+    if faces is None:  # upright
+        plan = shapely.Polygon(seen_from_above(piece))
+        return plan, plan
     ends = [
         shapely.union_all([shapely.Polygon(outline) for outline in piece.cut("z", at)])
         for at in (low_mm + SLIVER_MM, high_mm - SLIVER_MM)

@@ -180,7 +180,7 @@ def write_step(scene: Scene, colours: Mapping[str, str], title: str, path: Path)
     try:
         path.write_bytes(b"")  # says why it cannot, which the kernel does not
         # Where all faces are planes, curves in their parameters say nothing new, in twice the time and the bytes.
-        is_round = any(piece.is_round() for body in scene.bodies for piece in body.pieces)
+        is_round = any(piece.is_round() for _, piece in scene.pieces)
         export_step(assembly, path, write_pcurves=is_round, timestamp=TIME_STAMP)
         # What differs from run to run is made equal, and bodies get their real names.
         step = path.read_bytes()

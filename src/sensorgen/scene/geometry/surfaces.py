@@ -177,15 +177,10 @@ def _filled(points: Real, faces: Whole) -> tuple[Whole, list[str], list[SurfaceF
         after[b].append(a)  # the other way round: as the face that is missing has them
     added, repairs, faults = [faces], [], []
     while after:
-        start = next(iter(after))
-        loop = [start]
-        while loop[-1] in after and (len(loop) == 1 or loop[-1] != start):
-            ends = after[loop[-1]]
-            loop.append(ends.pop())
-            if not ends:
-                del after[loop[-2]]
-        ring = np.array(loop[:-1] if loop[-1] == start else loop)
-        cap = _cap(points[ring]) if loop[-1] == start and len(ring) > 2 else None
+        *loop, last = _loop(after)
+        closes = last == loop[0]
+        ring = np.array(loop if closes else [*loop, last])
+        cap = _cap(points[ring]) if closes and len(ring) > 2 else None
         place = _place(points[ring].mean(0))
         if cap is None:
             message = f"it is open: a gap with an edge of {len(ring)} sides that is not flat"
@@ -195,6 +190,17 @@ def _filled(points: Real, faces: Whole) -> tuple[Whole, list[str], list[SurfaceF
             repairs.append(f"a flat opening of {len(ring)} sides closed at x {x:g}, y {y:g}, z {z:g} mm")
             added.append(ring[cap])
     return np.concatenate(added), repairs, faults
+
+
+def _loop(after: dict[int, list[int]]) -> list[int]:
+    """Take the edges of one opening out of the next ends by corner: its corners, the first again where it closes."""
+    loop = [next(iter(after))]
+    while loop[-1] in after and (len(loop) == 1 or loop[-1] != loop[0]):
+        ends = after[loop[-1]]
+        loop.append(ends.pop())
+        if not ends:
+            del after[loop[-2]]
+    return loop
 
 
 def _cap(ring: Real) -> Whole | None:
@@ -258,9 +264,8 @@ def _through_material(
     tips -= (tips @ axis)[:, None] * axis
     u = tips[0] / max(np.linalg.norm(tips[0]), 1e-300)
     angle = np.arctan2(tips @ np.cross(axis, u), tips @ u)
-    pairs, ups = [], [k for k in range(len(here)) if forward[here[k]]]
-    left = [k for k in range(len(here)) if not forward[here[k]]]
-    for k in ups:  # material lies clockwise of a face whose edge runs along the axis
+    pairs, left = [], np.flatnonzero(~forward[here]).tolist()
+    for k in np.flatnonzero(forward[here]).tolist():  # material lies clockwise of a face whose edge runs along the axis
         gaps = [(angle[k] - angle[j]) % (2 * np.pi) for j in left]
         gaps = [g if 1e-7 < g < 2 * np.pi - 1e-7 else 2 * np.pi for g in gaps]
         j = left.pop(int(np.argmin(gaps)))
@@ -437,9 +442,7 @@ def _prisms(mesh: Mesh, axis: str, near_mm: float) -> tuple[Prism, ...]:
     for n, low in enumerate(levels[:-1]):
         added, gone = (_region(mesh, faces[n, up], plane, near_mm) for up in (False, True))
         region = shapely.union(shapely.difference(region, gone, grid_size=_GRID_MM), added, grid_size=_GRID_MM)
-        now: dict[Outline, float] = {}
-        for outline in outlines(region):
-            now[outline] = growing.pop(outline, low)
+        now = {outline: growing.pop(outline, low) for outline in outlines(region)}
         prisms += [_prism(axis, outline, start, low) for outline, start in growing.items()]
         growing = now
         if len(prisms) + len(now) > MOST_PRISMS:

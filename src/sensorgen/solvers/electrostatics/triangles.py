@@ -11,7 +11,7 @@ from math import atan2, hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.scene.sections import ROUNDING_MM, Section
+from sensorgen.scene.sections import ROUNDING_MM, Section, distinct
 from sensorgen.scene.unit_cell import SectionCell, cell
 
 Edge = tuple[int, int]
@@ -142,8 +142,8 @@ def _all(cell: SectionCell) -> tuple[NDArray[np.float64], _Filled]:
     levels = []  # heights at which anything meets the line between slice k - 1 and slice k
     for k in range(len(ends)):
         sides = zip(cell.slices[max(k - 1, 0) : k + 1], (1, 0) if k else (0,), strict=False)
-        heights = sorted(z for s, side in sides for b in s.bands for z in (b.bottom_mm[side], b.top_mm[side]))
-        levels.append([z for n, z in enumerate(heights) if n == 0 or z - heights[n - 1] > ROUNDING_MM])
+        heights = (z for s, side in sides for b in s.bands for z in (b.bottom_mm[side], b.top_mm[side]))
+        levels.append(distinct(heights, ROUNDING_MM))
     first = np.concatenate([[0], np.cumsum([len(z) for z in levels])])
     points = np.array([(x, z) for x, heights in zip(ends, levels, strict=True) for z in heights])
     filled: _Filled = []
