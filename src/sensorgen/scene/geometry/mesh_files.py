@@ -293,9 +293,8 @@ def _bodies(
     if one.kind not in ("model", "other"):
         return
     for part, place in one.components:
-        linear = place[:3] @ where[:3]
-        shift = place[3] @ where[:3] + where[3]
-        yield from _bodies(model, part, np.vstack([linear, shift]), parts, depth + 1)
+        moved = np.vstack([place[:3] @ where[:3], place[3] @ where[:3] + where[3]])
+        yield from _bodies(model, part, moved, parts, depth + 1)
     if not one.triangles:
         return
     points = np.array(one.vertices, float).reshape(-1, 3) @ where[:3] + where[3]

@@ -143,31 +143,41 @@ def meshed(cell: ContactCell, coarse_mm: float, growth: float, count: int = 6) -
         The mesher gave up, or left a hole.
     """
     edges, room = cell.edges, _ROUNDING * cell.width_mm()
-    cut, thin = dict(edges), wedges(edges, cell.air) if cell.air != OUTSIDE else []
-    for number, wedge in enumerate(thin, 1):
-        for p, q in (*pairwise(wedge.first), *pairwise(wedge.second[::-1])):
-            key, place = ((p, q), 0) if (p, q) in cut else ((q, p), 1)
-            cut[key] = (-number, cut[key][1]) if place == 0 else (cut[key][0], -number)
-        if wedge.first[-1] != wedge.second[-1]:
-            cut[wedge.first[-1], wedge.second[-1]] = (-number, cell.air)
+    thin = wedges(edges, cell.air) if cell.air != OUTSIDE else []
+    cut = _without(thin, edges, cell.air)
     if any(not cell.left_mm - room <= x <= cell.right_mm + room for edge in edges for x, _ in edge):
         raise Unmeshed("the deformed outlines run through the mirrors")
     _refuse_crossings(np.array(list(cut)).reshape(-1, 2, 2))
     net = triangulated(cut, coarse_mm, growth, quick=True)
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
-    # Compare the area within the edges with that of the triangles (m, 3, 2), none of which may be turned over
-    placed = net.points_m[corners]
-    drawn = sum(
-        0.5 * (a[0] * b[1] - a[1] * b[0]) * ((left > 0) - (right > 0)) for (a, b), (left, right) in edges.items()
-    )
-    u, v = placed[:, 1] - placed[:, 0], placed[:, 2] - placed[:, 0]
-    parts = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / M_PER_MM**2
-    if parts.min() <= 0 or abs(parts.sum() / drawn - 1) > _HOLE:
-        raise Unmeshed("the mesh has holes or folds")
+    _refuse_holes(net.points_m[corners], edges)
     region = np.concatenate([net.region, np.full(len(new), cell.air)])
     tips = [nearest(net.points_m, place) for place in sharp_corners(edges, cell.left_mm, cell.right_mm)]
     return of_triangles(*ringed(net.points_m, corners, region, tips, count), turned=cell.turned)
+
+
+def _without(wedges: Sequence[Wedge], edges: Edges, air: int) -> dict[Edge, tuple[int, int]]:
+    """Edges of a cell from which wedges are cut off: wedge k is region -k, and an edge parts it from other air."""
+    cut = dict(edges)
+    for number, wedge in enumerate(wedges, 1):
+        for p, q in (*pairwise(wedge.first), *pairwise(wedge.second[::-1])):
+            key, place = ((p, q), 0) if (p, q) in cut else ((q, p), 1)
+            cut[key] = (-number, cut[key][1]) if place == 0 else (cut[key][0], -number)
+        if wedge.first[-1] != wedge.second[-1]:
+            cut[wedge.first[-1], wedge.second[-1]] = (-number, air)
+    return cut
+
+
+def _refuse_holes(placed_m: Real, edges: Edges) -> None:
+    """Refuse triangles (m, 3, 2) of another area than the edges enclose, or one that is turned over."""
+    drawn = sum(
+        0.5 * (a[0] * b[1] - a[1] * b[0]) * ((left > 0) - (right > 0)) for (a, b), (left, right) in edges.items()
+    )
+    u, v = placed_m[:, 1] - placed_m[:, 0], placed_m[:, 2] - placed_m[:, 0]
+    parts = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / M_PER_MM**2
+    if parts.min() <= 0 or abs(parts.sum() / drawn - 1) > _HOLE:
+        raise Unmeshed("the mesh has holes or folds")
 
 
 def _refuse_crossings(edges: Real) -> None:
@@ -228,24 +238,30 @@ def wedges(edges: Mapping[Edge, tuple[int, int]], air: int) -> list[Wedge]:
     for tip in list(ahead):
         for out, into in product(ahead[tip], back[tip]):
             if _is_tip(tip, out, into, ahead) and not {out, into} & used and _is_free(tip, out, into, points):
-                # Walk along both sides, where the way across is shorter, until the air is thick or both sides meet.
-                first, second = [tip, out], [tip, into]
-                while first[-1] != second[-1] and ahead[first[-1]] and back[second[-1]]:
-                    on_first, on_second = ahead[first[-1]][0], back[second[-1]][0]
-                    if on_first == second[-1]:
-                        first.append(on_first)
-                        break
-                    thick = min(_off(first[-1], second[-1], on_second), _off(second[-1], first[-1], on_first))
-                    if thick > _THICK * min(_far(first[-1], on_first), _far(second[-1], on_second)):
-                        break
-                    shorter = _far(on_first, second[-1]) < _far(first[-1], on_second)
-                    side, ahead_on = (first, on_first) if shorter else (second, on_second)
-                    if not _is_free(first[-1], ahead_on, second[-1], points):  # the way across would cut a side
-                        break
-                    side.append(ahead_on)
-                found.append(Wedge(tuple(first), tuple(second)))
+                found.append(_walked([tip, out], [tip, into], ahead, back, points))
                 used |= {*found[-1].first[1:], *found[-1].second[1:]}
     return found
+
+
+def _walked(
+    first: list[Point], second: list[Point], ahead: Mapping[Point, list[Point]], back: Mapping[Point, list[Point]],
+    points: Real,
+) -> Wedge:  # fmt: skip
+    """Walk along both sides, where the way across is shorter, until the air is thick or both sides meet."""
+    while first[-1] != second[-1] and ahead[first[-1]] and back[second[-1]]:
+        on_first, on_second = ahead[first[-1]][0], back[second[-1]][0]
+        if on_first == second[-1]:
+            first.append(on_first)
+            break
+        thick = min(_off(first[-1], second[-1], on_second), _off(second[-1], first[-1], on_first))
+        if thick > _THICK * min(_far(first[-1], on_first), _far(second[-1], on_second)):
+            break
+        shorter = _far(on_first, second[-1]) < _far(first[-1], on_second)
+        side, ahead_on = (first, on_first) if shorter else (second, on_second)
+        if not _is_free(first[-1], ahead_on, second[-1], points):  # the way across would cut a side
+            break
+        side.append(ahead_on)
+    return Wedge(tuple(first), tuple(second))
 
 
 def _is_tip(tip: Point, out: Point, into: Point, ahead: Mapping[Point, list[Point]]) -> bool:

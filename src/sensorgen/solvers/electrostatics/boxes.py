@@ -12,10 +12,10 @@ sum over the three directions, each a product of one-dimensional matrices:
 In the eigenvectors of g the unknowns inside a box do not couple, so that they are eliminated by a division.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
@@ -162,18 +162,18 @@ def layered(coarse: Grid, values: Sequence[float], layers: int) -> Grid:
 
 def _wanted(around: list[int], values: Sequence[float], layers: int) -> int:
     """Layers that an edge asks for, by what fills the four boxes around it in turn."""
-    free = [code > 1 for code in around]
-    if not any(free):
-        return 0
-    if all(free):
-        fan = tuple((np.pi / 2, values[code]) for code in around)
-        return layers // 2 if exponent(fan, None) < _INFINITE else 0
-    starts = [k for k in range(4) if free[k] and not free[k - 1]]
-    for start in starts:
-        run = [around[(start + k) % 4] for k in range(next(k for k in range(1, 4) if not free[(start + k) % 4]))]
-        if exponent(tuple((np.pi / 2, values[code]) for code in run), (True, True)) < _INFINITE:
-            return layers
-    return 0
+    fans = [tuple((np.pi / 2, values[code]) for code in run) for run in _runs(around)]
+    if all(code > 1 for code in around):
+        return layers // 2 if exponent(fans[0], None) < _INFINITE else 0
+    return layers if any(exponent(fan, (True, True)) < _INFINITE for fan in fans) else 0
+
+
+def _runs(around: list[int]) -> Iterator[list[int]]:
+    """Dielectrics in turn around an edge, parted by the conductors there."""
+    start = next((k for k in range(4) if around[k] <= 1), 0)
+    for is_free, run in groupby(around[start:] + around[:start], lambda code: code > 1):
+        if is_free:
+            yield list(run)
 
 
 def _graded(planes: Real, layers: list[int]) -> tuple[Real, Whole]:

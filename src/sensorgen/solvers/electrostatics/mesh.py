@@ -300,7 +300,7 @@ def _cuts(
     cones: Collection[int],
 ) -> Iterator[list[int]]:  # fmt: skip
     """For each loop that carries flux but the first, points from it to another one, all inside but for both ends."""
-    reached, before = {start}, {k: k for k in loops if loops[k] == start and k in ends}
+    reached, before = {start}, {k: k for k in _ends_of(start, loops, ends)}
     todo = deque(before)
     while todo and reached < carrying:
         here = todo.popleft()
@@ -317,9 +317,14 @@ def _cuts(
                     path.append(before[path[-1]])
                 yield path
                 reached.add(loops[spoke])
-                new = [k for k in loops if loops[k] == loops[spoke] and k in ends]
+                new = _ends_of(loops[spoke], loops, ends)
                 before |= {k: k for k in new}
                 todo += new
+
+
+def _ends_of(loop: int, loops: Mapping[int, int], ends: Collection[int]) -> list[int]:
+    """Points of a loop at which a cut may end."""
+    return [k for k, own in loops.items() if own == loop and k in ends]
 
 
 def _beside(around: dict[int, Fan], path: list[int]) -> Iterator[tuple[int, int]]:

@@ -8,7 +8,7 @@ Netgen's CAD kernel makes the elements. Conductors are cut out of the cell, and 
 towards edges and tips of conductors, where the field is infinite (hp-refinement), and where bodies are near each other.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from math import atan2, inf, pi
@@ -167,17 +167,10 @@ def _shape(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> tuple[A
     """All dielectrics with their common faces, named by conductor; edges and tips to be graded are marked."""
     import netgen.occ as occ
 
-    named = _solids(cell, cusps)
-    for name, shape in named:
-        for one in shape.solids:
-            one.name = name
-    whole = occ.Glue([one for _, shape in named for one in shape.solids]).solids
+    whole = _glued(_solids(cell, cusps))
     metal, dielectrics = ([one for one in whole if (one.name[0] == "c") == is_metal] for is_metal in (True, False))
     faces = _named_faces([one for one in dielectrics if one.name[0] == "t"] + metal)
-    conductors = [faces.get(f"c{k}", []) for k in range(cell.conductors)]
-    places = [{_key(v.p) for face in own for v in face.vertices} for own in conductors]
-    if not dielectrics or any(a & b for a, b in combinations(places, 2)):
-        raise Unsolved("the electrodes touch: the capacitance grows without bound")
+    _refuse_contact(cell, faces, dielectrics)
     _refuse_open(cell, dielectrics)
     grading = _Grading(cell)
     grading.mark([face for name, own in faces.items() if name[0] == "c" for face in own])
@@ -192,6 +185,24 @@ def _named_faces(solids: Sequence[Any]) -> dict[str, list[Any]]:
             face.name = one.name + (ROUND if (face.name or "").endswith(ROUND) else "")
         faces.setdefault(one.name, []).extend(one.faces)
     return faces
+
+
+def _glued(named: Sequence[tuple[str, Any]]) -> list[Any]:
+    """Solids of some shapes, each with its name; faces between them are one."""
+    import netgen.occ as occ
+
+    for name, shape in named:
+        for one in shape.solids:
+            one.name = name
+    return list(occ.Glue([one for _, shape in named for one in shape.solids]).solids)
+
+
+def _refuse_contact(cell: RoundCell, faces: Mapping[str, Sequence[Any]], dielectrics: Sequence[Any]) -> None:
+    """Refuse conductors that meet somewhere, or leave no dielectric."""
+    conductors = [faces.get(f"c{k}", []) for k in range(cell.conductors)]
+    places = [{_key(v.p) for face in own for v in face.vertices} for own in conductors]
+    if not dielectrics or any(a & b for a, b in combinations(places, 2)):
+        raise Unsolved("the electrodes touch: the capacitance grows without bound")
 
 
 def _refuse_open(cell: RoundCell, dielectrics: Sequence[Any]) -> None:
