@@ -113,20 +113,24 @@ def _per_resistivity(alone: Scene, axis: str, width: float) -> Interval:
     if len(along) == 1:
         return _best(_in_plane(alone, along[0], width), simple)
     if all(p.is_box() for _, p in alone.pieces):
-        # Kept on disk: a cell of boxes takes a third of a second.
-        look = [content(p) for _, p in alone.pieces]
-        key = sha256(dumps([look, alone.size_mm]).encode()).hexdigest()
-        question = {"what": "conduction", "scene": key, "axis": axis, "width": width}
-        bounds = cached.known(question)
-        if bounds is None:
-            bounds = [(step.lower, step.upper) for step in _in_space(alone, axis, width)]
-            cached.keep(question, bounds)
-        simple = _best((Interval(*ends) for ends in bounds), simple)
+        simple = _best((Interval(*ends) for ends in _known_in_space(alone, axis, width)), simple)
     if simple.upper == np.inf:
         raise _interrupted(
             alone, axis, "no piece of it runs unchanged from end to end; expected a plate under the cogs"
         )
     return simple
+
+
+def _known_in_space(alone: Scene, axis: str, width: float) -> list[tuple[float, float]]:
+    """Bounds of :func:`_in_space`, kept on disk: a cell of boxes takes a third of a second."""
+    look = [content(p) for _, p in alone.pieces]
+    key = sha256(dumps([look, alone.size_mm]).encode()).hexdigest()
+    question = {"what": "conduction", "scene": key, "axis": axis, "width": width}
+    bounds: list[tuple[float, float]] | None = cached.known(question)
+    if bounds is None:
+        bounds = [(step.lower, step.upper) for step in _in_space(alone, axis, width)]
+        cached.keep(question, bounds)
+    return bounds
 
 
 def _interrupted(alone: Scene, axis: str, why: str) -> OutOfRange:

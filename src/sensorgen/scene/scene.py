@@ -262,6 +262,11 @@ class Scene:
         return replace(self, bodies=tuple(bodies))
 
 
+def dielectrics(bodies: Iterable[Body]) -> tuple[str, ...]:
+    """Materials of bodies of no terminal, air last."""
+    return (*sorted({body.material for body in bodies if not body.terminal} - {"air"}), "air")
+
+
 @dataclass(frozen=True)
 class Fill:
     """Materials by the part of a shape that they fill; "" leaves it empty."""
