@@ -125,15 +125,7 @@ def _period(
     """A period along an axis, and whether it repeats by shifts."""
     end, wide = size_mm[axis], size_mm[1 - axis]
     patterned = [layer for layer in layers if layer.along != "xy"[axis]]
-    if all(layer.along for layer in patterned):
-        low, high = _of_strips(
-            list({region for layer in patterned for region in layer.regions.values()}), size_mm, axis
-        )
-        width, shifts = high - low, False
-    else:
-        repeated = repeat([region for layer in patterned for region in layer.regions.values()], size_mm, axis)
-        low, shifts = repeated.low_mm, repeated.shifts
-        width = (repeated.high_mm - low) / (2 if shifts else 1)
+    low, width, shifts = _repeating(patterned, size_mm, axis)
     middle = int((end / 2 - low) // width)
     starts = [low + k * width for k in range(middle - 3, middle + 3)]
     inside = [s for s in starts if s > -SLIVER_MM and s + 2 * width < end + SLIVER_MM]
@@ -147,6 +139,17 @@ def _period(
 
     start = min(inside, key=lambda s: (crossed(s), abs(s + width - end / 2)))
     return (start, start + 2 * width), shifts
+
+
+def _repeating(patterned: Sequence[LayerRegions], size_mm: Sequence[float], axis: int) -> tuple[float, float, bool]:
+    """Start of a period along an axis, half of it [mm], and whether it repeats by shifts; else by mirrors."""
+    regions = [region for layer in patterned for region in layer.regions.values()]
+    if all(layer.along for layer in patterned):
+        low, high = _of_strips(list(set(regions)), size_mm, axis)
+        return low, high - low, False
+    repeated = repeat(regions, size_mm, axis)
+    width = repeated.high_mm - repeated.low_mm
+    return repeated.low_mm, width / 2 if repeated.shifts else width, repeated.shifts
 
 
 def _of_strips(regions: Sequence[Region], size_mm: Sequence[float], axis: int) -> Point:

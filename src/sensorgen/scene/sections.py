@@ -256,8 +256,7 @@ def _levels(scene: Scene, cuts: int) -> list[float]:
     for _, piece in scene.pieces:
         upright = piece.is_constant("z")
         heights += piece.span("z") if upright else (*np.linspace(*piece.span("z"), cuts + 1), *piece.levels_mm())
-    levels = np.unique(np.array(heights).round(9))
-    return list(levels[np.append(True, np.diff(levels) > SLIVER_MM)].tolist())
+    return distinct(np.array(heights).round(9).tolist(), SLIVER_MM)
 
 
 def covered(scene: Scene, terminal: str) -> bool:

@@ -333,15 +333,14 @@ def svg(
     taken: list[Point] = [place for panel in details for place in panels.letter_places(panel).values()]
     left, room = SPLIT + 3, RIGHT - SPLIT - 3
     rows = title_rows(scene, details[0].frame, grid, gap[0] if gap else None, notes)
-    marks = []
+    mark = ""
     if gap and gap[0].near[0] <= gap[1].view.end_mm:  # in the view that shows it smallest
         mark, space = panels.gap(gap[1], gap[0])
         taken += space
-        marks.append(mark)
     parts = [
         *_sections(scene, details, lanes, grid, materials),
         *(part for panel in details if printed for part in panels.outlined(panel, printed)),
-        *marks,
+        mark,
         *on_detail(shown, details, grid, taken),
         *_overview(scene, details, wholes, materials),
         *on_overview(shown, details, wholes),
