@@ -127,12 +127,14 @@ def _owners(design: Design, tool: Whole, layer: Whole, middle_mm: Real) -> Whole
             near = sorted(layers, key=lambda each: abs(each.bottom_mm - layers[number].bottom_mm))
             each = next(each for each in near if mine.keys() & each.regions.keys())
             shown = {mine[name]: region for name, region in each.regions.items() if name in mine}
-            body[rows] = _nearest(shown, middle_mm[rows]) if len(shown) > 1 else next(iter(shown))
+            body[rows] = _nearest(shown, middle_mm[rows])
     return body
 
 
 def _nearest(regions: Mapping[int, Region], places_mm: Real) -> Whole:
     """Number of the region that is nearest to each place, (n,)."""
+    if len(regions) == 1:
+        return np.full(len(places_mm), next(iter(regions)))
     pieces = [parts(region) for region in regions.values()]
     owners = np.repeat([*regions], [len(each) for each in pieces])
     return np.asarray(owners[shapely.STRtree([*chain.from_iterable(pieces)]).nearest(shapely.points(places_mm))])

@@ -274,12 +274,7 @@ def drags(design: Design, source: Source) -> DesignDrags:
     terminal = np.array([of.get(number, "") for number in lines.number.tolist()])
     travel, row = found.travel, found.travel.row
     place = travel.place_mm - travel.gap_mm[:, None] * [0.0, 0.0, 1.0]  # where a strand would lie
-    # the line that a tool has printed last before each of its travels
-    last = np.full(len(row), -1)
-    for tool in np.unique(lines.tool).tolist():
-        mine, rows = np.flatnonzero(lines.tool == tool), found.tool[row] == tool
-        before = np.searchsorted(lines.number[mine], motion.number[row[rows]]) - 1
-        last[rows] = np.where(before >= 0, mine[before], -1)
+    last = _last_lines(lines, found.tool[row], motion.number[row])
     own = np.where(last >= 0, terminal[last], "")
     left = np.full(len(row), np.inf)
     for one in set(terminals) - {""}:
@@ -293,6 +288,16 @@ def drags(design: Design, source: Source) -> DesignDrags:
         insulation = round(left_steps * _STEP_MM, 4) if np.isfinite(left_steps) else None
         strands.append(Strand(round(z_steps * _STEP_MM, 4), insulation, *lengths))
     return DesignDrags(**vars(summed(motion, found, machine)), strands=tuple(strands))
+
+
+def _last_lines(lines: PrintedLines, tool: Whole, number: Whole) -> Whole:
+    """Row of the line that a tool has printed last before a line of the file, -1 without any (n,)."""
+    last = np.full(len(tool), -1)
+    for one in np.unique(lines.tool).tolist():
+        mine, rows = np.flatnonzero(lines.tool == one), tool == one
+        before = np.searchsorted(lines.number[mine], number[rows]) - 1
+        last[rows] = np.where(before >= 0, mine[before], -1)
+    return last
 
 
 def _insulation(place_mm: Real, lines: PrintedLines, tops_mm: Real) -> Real:

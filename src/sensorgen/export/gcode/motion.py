@@ -81,13 +81,7 @@ class _Steps:
         far = ~np.all([np.abs(rows[:, k]) < MOST_MM for k in range(9)], axis=0)
         rows[far, :9] = np.clip(rows[far, :9], -MOST_MM, MOST_MM)
         faults = [FileFault(int(number), "a number beyond all measure") for number in rows[far, 9][:1]]
-        straight = self.moves & (self.code < 2)
-        for letters, what in (
-            ("R", "R of G0 or G1 goes by a stored place"),
-            ("IJ", "I or J stands in a straight move"),
-        ):
-            given = straight & np.any([~np.isnan(self.words[letter]) for letter in letters], axis=0)
-            faults += [FileFault(n >> SHIFT, what) for n in self.place[given].tolist()]
+        faults += self._odd_words()
         arcs, wrong = self._arcs(rows)
         told = [*file.events, *file.odd]
         before = iter(self._rows([*(place for place, _ in told), *(place for place, _, _ in file.changes)]))
@@ -100,6 +94,16 @@ class _Steps:
             self._track(file.absolute_e), sorted([*file.faults, *faults, *wrong], key=lambda fault: fault.number),
             file.lines, file.maker, self._z_stated(),
         )  # fmt: skip
+
+    def _odd_words(self) -> Iterator[FileFault]:
+        """R, I and J of straight moves, where they mean no arc."""
+        straight = self.moves & (self.code < 2)
+        for letters, what in (
+            ("R", "R of G0 or G1 goes by a stored place"),
+            ("IJ", "I or J stands in a straight move"),
+        ):
+            given = straight & np.any([~np.isnan(self.words[letter]) for letter in letters], axis=0)
+            yield from (FileFault(n >> SHIFT, what) for n in self.place[given].tolist())
 
     def _columns(self) -> Iterator[Real]:
         """Columns of ``Motion.rows``, for each step; one by one, since a million moves take room."""

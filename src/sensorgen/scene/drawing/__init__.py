@@ -17,6 +17,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
+from itertools import chain
 from math import cos, hypot, pi, sin
 
 from sensorgen.core.findings import Finding, counted, counts, grouped
@@ -330,7 +331,7 @@ def svg(
     entries = placed(marked, letters, (LEFT + 2, FOOT + 8.5, SPLIT - 3, BOTTOM - 2))
     shown = [entry.mark for entry in entries]
     gap = _nearest(details)
-    taken: list[Point] = [place for panel in details for place in panels.letter_places(panel).values()]
+    taken = list[Point](chain.from_iterable(panels.letter_places(panel).values() for panel in details))
     left, room = SPLIT + 3, RIGHT - SPLIT - 3
     rows = title_rows(scene, details[0].frame, grid, gap[0] if gap else None, notes)
     mark = ""

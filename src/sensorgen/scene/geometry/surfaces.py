@@ -169,11 +169,8 @@ def _oriented(faces: Whole) -> tuple[Whole, int]:
 
 def _filled(points: Real, faces: Whole) -> tuple[Whole, list[str], list[SurfaceFault]]:
     """Triangles with flat openings closed, how, and the openings that are not flat."""
-    edges = _edges(faces)[_open(faces)]
-    if not len(edges):
-        return faces, [], []
     after = defaultdict(list)
-    for a, b in edges.tolist():
+    for a, b in _edges(faces)[_open(faces)].tolist():
         after[b].append(a)  # the other way round: as the face that is missing has them
     added, repairs, faults = [faces], [], []
     while after:
