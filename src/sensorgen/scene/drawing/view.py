@@ -91,11 +91,12 @@ def _stretches(scene: Scene, normal: str) -> list[Point]:
 def _view(scene: Scene, across: str) -> View:
     """The section in which most of the terminals is seen: through the conductor strips, not beside them."""
     normal = "y" if across == "x" else "x"
+    spans = [(p.span(normal), body, p) for body, p in scene.pieces]
     cuts = []
     for low, high in _stretches(scene, normal)[:PLACES]:
         at = (low + high) / 2
-        here = ((body, p) for body, p in scene.pieces if p.span(normal)[0] < at < p.span(normal)[1])
-        cuts.append(Section(across, high - low, at, tuple((body, o) for body, p in here for o in p.cut(normal, at))))
+        cut = ((body, o) for (start, end), body, p in spans if start < at < end for o in p.cut(normal, at))
+        cuts.append(Section(across, high - low, at, tuple(cut)))
     section = max(cuts, key=_shown_mm2)
     extent = scene.size_mm[AXES.index(across)]
     corners = sorted({u for _, outline in section.regions for u, _ in outline})

@@ -20,7 +20,7 @@ _DIGITS = 9  # of a coordinate [mm]: places nearer than a picometre are one
 _SLIVER_MM = 1e-9
 
 Edge = tuple[Point, Point]
-Place = TypeVar("Place", Point, int)  # an end of an edge, or its node's number
+End = TypeVar("End", Point, int)  # an end of an edge, or its node's number
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ def _in_line(first: Edge, second: Edge) -> bool:
 
 
 def add(
-    edges: dict[tuple[Place, Place], tuple[int, int]], a: Place, b: Place, sides: tuple[int, int],
+    edges: dict[tuple[End, End], tuple[int, int]], a: End, b: End, sides: tuple[int, int],
     empty: int = OUTSIDE,
 ) -> None:  # fmt: skip
     """Add an edge of some length, from its lesser end on; a side that is ``empty`` keeps the region that it has."""
@@ -187,7 +187,7 @@ def add(
     edges[key] = (known[0] if left == empty else left, known[1] if right == empty else right)
 
 
-def borders(edges: Mapping[tuple[Place, Place], tuple[int, int]]) -> dict[tuple[Place, Place], tuple[int, int]]:
+def borders(edges: Mapping[tuple[End, End], tuple[int, int]]) -> dict[tuple[End, End], tuple[int, int]]:
     """Edges between two different regions."""
     return {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
 
