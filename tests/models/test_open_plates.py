@@ -13,7 +13,7 @@ from sensorgen.models import capacitance_models, overlap, prisms
 from sensorgen.prediction.capacitance import OPEN, capacitance, default_width
 from sensorgen.scene.polyhedra import Loft
 from sensorgen.scene.scene import FLOATING, Body, Prism, Scene, box
-from sensorgen.scene.sections import covered, is_open, slabs
+from sensorgen.scene.slabs import covered, is_open, slabs
 
 solver = pytest.mark.skipif(importlib.util.find_spec("ngsolve") is None, reason="NGSolve is not installed")
 EPS = {"x60": 4.68, "air": 1.0}

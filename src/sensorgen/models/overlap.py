@@ -17,7 +17,7 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.layers import Region
 from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene
-from sensorgen.scene.sections import Slab, is_open, slabs
+from sensorgen.scene.slabs import Slab, is_open, slabs
 
 SOURCE = "Dirichlet's and Thomson's principles"
 COST = 1

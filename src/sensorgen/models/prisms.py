@@ -23,7 +23,7 @@ from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, parts
 from sensorgen.scene.repetition import Repeat, halved, raster, repeat, widened
 from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, dielectrics
-from sensorgen.scene.sections import Slab, is_open, slabs
+from sensorgen.scene.slabs import Slab, is_open, slabs
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, LayerCell, PrismMesh, plan, solved
 

@@ -24,7 +24,8 @@ from sensorgen.design.body import Cells
 from sensorgen.models import capacitance_models
 from sensorgen.prediction.plan import PlanCandidate
 from sensorgen.scene.scene import FLOATING, Scene, content
-from sensorgen.scene.sections import is_open, overlap, sections
+from sensorgen.scene.sections import overlap, sections
+from sensorgen.scene.slabs import is_open
 
 FILE = "expected.yaml"
 

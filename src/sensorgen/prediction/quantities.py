@@ -43,7 +43,7 @@ from sensorgen.prediction.rest_state import (
 )
 from sensorgen.prediction.results import SCHEMA, Impedance, Narrowing, Prediction, UnderTop
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
-from sensorgen.scene.sections import is_open
+from sensorgen.scene.slabs import is_open
 
 WIDE = 3.0  # upper over lower end, from which on a measurement is advised
 _METER, _PRESS = 1.02, 1.1  # upper over lower end of what a meter, and what a known weight, leave of what they measure

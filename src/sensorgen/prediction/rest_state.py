@@ -23,7 +23,7 @@ from sensorgen.design.values import (
 )
 from sensorgen.prediction.capacitance import PLANE, Answer, Unpredictable, capacitance, default_width, of_sensor
 from sensorgen.scene.scene import Scene
-from sensorgen.scene.sections import is_open
+from sensorgen.scene.slabs import is_open
 
 
 def electrode_resistance(body: Body, ends: Sequence[str] = ENDS) -> dict[str, Bounds]:

@@ -14,7 +14,8 @@ from sensorgen.prediction.compression_law import Law, gap_m, law_of
 from sensorgen.prediction.mesh_ladder import PressedPiece
 from sensorgen.prediction.query import FLAT, Tip
 from sensorgen.prediction.rest_state import Lost, RestState, lost, rest_state
-from sensorgen.scene.sections import is_open, square_to
+from sensorgen.scene.sections import square_to
+from sensorgen.scene.slabs import is_open
 
 _PEAK = 1.5  # pressure in the middle of a parabola over its mean; of a Hertzian one 4 / pi [-]
 
