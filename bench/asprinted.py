@@ -20,7 +20,7 @@ from sensorgen.asprinted.printed import body, gap_mm
 from sensorgen.checks.estimate import RULES
 from sensorgen.design.design import make
 from sensorgen.export import slicing
-from sensorgen.export.gcode import paths
+from sensorgen.export.gcode import motion as paths
 from sensorgen.models import fem2d, traxels
 from sensorgen.verification.chart.rectilinear import plate
 

@@ -18,8 +18,7 @@ import ngsolve as ng
 from sensorgen.scene.polyhedra import Loft
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Piece, Prism, box
-from sensorgen.solvers.electrostatics.round_bodies import LEVELS, RoundCell, solved
-from sensorgen.solvers.electrostatics.round_mesh import mesh_of, solid
+from sensorgen.solvers.electrostatics.round_bodies import LEVELS, RoundCell, mesh_of, solid, solved
 
 FILM, HIGH, HALF = 0.1, 0.5, 0.5
 EPS = (3.0, 2.5, 1.0)

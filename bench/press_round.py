@@ -24,7 +24,7 @@ from sensorgen.models import curved, press3d, press_round
 from sensorgen.models.press_round import Elastic
 from sensorgen.prediction.mesh_ladder import limit as two_meshes
 from sensorgen.scene.scene import Scene
-from sensorgen.solvers.electrostatics.round_mesh import solid
+from sensorgen.solvers.electrostatics.round_bodies import solid
 
 SOLIDS = {"etpu": Elastic(12e6, 0.45), "x60": Elastic(26e6, 0.45)}
 EPS = {"x60": 4.68, "air": 1.0}

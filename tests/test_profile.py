@@ -9,7 +9,8 @@ from sensorgen.checks import estimate
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.design import design
 from sensorgen.design.walls import rule, rules
-from sensorgen.export.slicers import cura, curaengine, orca, prusa
+from sensorgen.export.slicers import cura, orca, prusa
+from sensorgen.export.slicers import cura as curaengine
 from sensorgen.export.slicers.loads import loads, overlaid
 from sensorgen.export.slicing import Placed, check
 from sensorgen.prediction.bodies import estimated

@@ -14,9 +14,9 @@ import pytest
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SlicerFailed, UnknownName
 from sensorgen.design import materials
-from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names
-from sensorgen.design.tower import MARGIN_MM, tower
-from sensorgen.export.slicers import cura, curaengine, orca, prusa, versions
+from sensorgen.design.printer import MARGIN_MM, Printer, load_printer, load_quality, printer_names, quality_names, tower
+from sensorgen.export.slicers import cura, orca, prusa, versions
+from sensorgen.export.slicers import cura as curaengine
 from sensorgen.export.slicers.loads import ToolLoad, recipes
 from sensorgen.export.slicers.run import run
 

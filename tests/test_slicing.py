@@ -20,7 +20,7 @@ from sensorgen.core.errors import BadInput, SlicerFailed, UnknownName, Unwritabl
 from sensorgen.design.design import make
 from sensorgen.design.printer import folder
 from sensorgen.export import slicing, threemf
-from sensorgen.export.gcode import paths
+from sensorgen.export.gcode import motion as paths
 from sensorgen.export.gcode.check import check
 from sensorgen.export.slicers import run
 from sensorgen.export.slicing import Placed, alone, sliced

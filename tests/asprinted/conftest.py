@@ -8,8 +8,9 @@ import pytest
 from sensorgen.asprinted.printed import body
 from sensorgen.design import design
 from sensorgen.export import slicing
-from sensorgen.export.gcode import paths
-from sensorgen.export.slicers import curaengine, prusa
+from sensorgen.export.gcode import motion as paths
+from sensorgen.export.slicers import cura as curaengine
+from sensorgen.export.slicers import prusa
 
 SIZES = {"tri": {"length_mm": 12.0, "width_mm": 8.0}, "rect": {"length_mm": 8.0, "width_mm": 8.0}}
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
-from sensorgen.asprinted import window
+from sensorgen.asprinted import printed as window
 from sensorgen.asprinted.beads import Beads, _narrowed, layers
 from sensorgen.asprinted.printed import gap_mm
 from sensorgen.checks import estimate

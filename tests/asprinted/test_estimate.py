@@ -6,7 +6,7 @@ from math import cos, pi, sin
 import pytest
 import shapely
 
-from sensorgen.asprinted import window
+from sensorgen.asprinted import printed as window
 from sensorgen.checks.estimate import LineLayout, layers, lines
 from sensorgen.core.errors import UnknownName
 from sensorgen.design import design

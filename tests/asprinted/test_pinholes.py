@@ -18,7 +18,7 @@ from sensorgen.analysis.shorts import chance, elsewhere, risk, series, verdicts
 from sensorgen.asprinted.beads import Beads
 from sensorgen.asprinted.pinholes import CoveredFilm, draws, findings, opened, pinholes, through
 from sensorgen.design.design import make
-from sensorgen.export.gcode import paths
+from sensorgen.export.gcode import motion as paths
 from sensorgen.measure.log import Log, importing
 from sensorgen.measure.log.entries import Reading
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from sensorgen.asprinted.beads import beads, layers
-from sensorgen.asprinted.printed import body, cell, gap_mm, nominal
-from sensorgen.asprinted.window import window
+from sensorgen.asprinted.printed import body, cell, gap_mm, nominal, window
 from sensorgen.checks.review import review
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.models import fem2d, fem3d, traxels

@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.design.printer import load_printer, load_quality
-from sensorgen.design.tower import tower
+from sensorgen.design.printer import load_printer, load_quality, tower
 from sensorgen.workflows.batch.layout import Rect, Room, column, packed, room
 
 FINE = load_quality("fine")

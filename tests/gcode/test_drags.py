@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
-from sensorgen.asprinted import strands
+from sensorgen.asprinted import nozzle as strands
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.design.printer import load_printer

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import load_printer
-from sensorgen.export.gcode import paths
+from sensorgen.export.gcode import motion as paths
 from sensorgen.export.gcode.check import check
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.reading import text_of

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import Macro, load_printer
-from sensorgen.export.gcode import paths
+from sensorgen.export.gcode import motion as paths
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.words import effect, parse
 

@@ -6,7 +6,7 @@ import pytest
 
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import load_printer
-from sensorgen.export.gcode import paths
+from sensorgen.export.gcode import motion as paths
 
 DIABASE = load_printer("diabase-h5")
 PRUSA = [

@@ -8,7 +8,7 @@ from sensorgen.core import lazy as registry
 from sensorgen.design import shapes
 from sensorgen.scene.geometry import surfaces
 from sensorgen.scene.geometry.meshes import mesh
-from sensorgen.scene.geometry.recognition import pieces
+from sensorgen.scene.geometry.surfaces import pieces
 from sensorgen.scene.polyhedra import Polyhedron
 from sensorgen.scene.scene import Body, Fill, Prism
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sensorgen.solvers.electrostatics.cones import RATIO
+from sensorgen.solvers.electrostatics.elements import RATIO
 from sensorgen.solvers.electrostatics.mesh import Cones
 
 

@@ -17,8 +17,7 @@ from sensorgen.design.shapes import rect
 from sensorgen.models import columns, fem3d
 from sensorgen.scene.scene import Body, Fill, Scene, box
 from sensorgen.solvers.electrostatics.bounds import FieldStep
-from sensorgen.solvers.electrostatics.boxes import Pair, boxes_of, flux, potential, whole
-from sensorgen.solvers.electrostatics.bricks import grid, layered
+from sensorgen.solvers.electrostatics.boxes import Pair, boxes_of, flux, grid, layered, potential, whole
 from sensorgen.solvers.electrostatics.elimination import HELD
 
 CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))

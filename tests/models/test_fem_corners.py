@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from sensorgen.solvers.electrostatics.corners import exponent, exponents
+from sensorgen.solvers.electrostatics.mesh import exponent, exponents
 from sensorgen.solvers.electrostatics.triangles import Triangles, apart, flipped
 
 

@@ -18,7 +18,6 @@ from sensorgen.models.press3d import BoundaryConditions, BrickCounts, Elastic
 from sensorgen.prediction.mesh_ladder import limit
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.contact import (
-    air,
     contact,
     element,
     factors,
@@ -26,6 +25,7 @@ from sensorgen.solvers.contact import (
     mapped_field,
     pressed,
 )
+from sensorgen.solvers.contact import mapped_field as air
 from sensorgen.solvers.contact.bricks import Bricks, mesh_of
 from sensorgen.solvers.contact.cell import Region
 from sensorgen.solvers.contact.mapped_field import FieldOrders

@@ -123,7 +123,7 @@ def slope_m_per_pa(scene, solids, fine_mm):
     import ngsolve as ng
     from netgen.meshing import MeshingParameters
 
-    from sensorgen.solvers.electrostatics.round_mesh import solid
+    from sensorgen.solvers.electrostatics.round_bodies import solid
 
     cell, _, _ = curved.cell(scene)
     shapes = []

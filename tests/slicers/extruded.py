@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.motion import NOT_MODEL, follow
 from sensorgen.export.gcode.moves import NO_TOOL, Motion
-from sensorgen.export.gcode.paths import NOT_MODEL
 from sensorgen.export.gcode.reading import Source
 
 

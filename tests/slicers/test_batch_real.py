@@ -14,9 +14,8 @@ from no_numbers import nothing, roughly_at_rest
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design import design
-from sensorgen.design.printer import load_printer
-from sensorgen.design.tower import tower
-from sensorgen.export.gcode import paths
+from sensorgen.design.printer import load_printer, tower
+from sensorgen.export.gcode import motion as paths
 from sensorgen.export.slicers import run
 from sensorgen.measure.log import prints
 from sensorgen.measure.log.entries import Prediction, RawFile

@@ -7,8 +7,7 @@ from sensorgen.asprinted import agreement
 from sensorgen.core.errors import BadInput
 from sensorgen.design import design
 from sensorgen.export.gcode.check import check_motion
-from sensorgen.export.gcode.motion import executed, follow
-from sensorgen.export.gcode.paths import paths_of
+from sensorgen.export.gcode.motion import executed, follow, paths_of
 from sensorgen.export.slicing import alone, sliced
 
 SENSOR = design.make(

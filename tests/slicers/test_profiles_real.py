@@ -16,9 +16,9 @@ import pytest
 
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design import materials
-from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names
-from sensorgen.design.tower import tower
-from sensorgen.export.slicers import cura, curaengine, prusa, versions
+from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names, tower
+from sensorgen.export.slicers import cura, prusa, versions
+from sensorgen.export.slicers import cura as curaengine
 from sensorgen.export.slicers.loads import ToolLoad
 
 DIABASE = load_printer("diabase-h5")

@@ -15,7 +15,7 @@ import pytest
 
 from sensorgen.core import yamlfile
 from sensorgen.design import design
-from sensorgen.export.gcode import paths
+from sensorgen.export.gcode import motion as paths
 from sensorgen.export.gcode.check import check
 from sensorgen.export.gcode.drags import lift
 from sensorgen.export.gcode.motion import follow

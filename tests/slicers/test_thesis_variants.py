@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from sensorgen.design import design
-from sensorgen.export.slicers import curaengine, prusa
+from sensorgen.export.slicers import cura as curaengine
+from sensorgen.export.slicers import prusa
 from sensorgen.export.slicers.loads import ToolLoad
 from sensorgen.scene.geometry import meshes
 from sensorgen.workflows.build import build

@@ -10,9 +10,9 @@ import pytest
 
 from sensorgen.core import yamlfile
 from sensorgen.design import design
-from sensorgen.design.tower import tower
+from sensorgen.design.printer import tower
 from sensorgen.export import slicing
-from sensorgen.export.gcode import paths
+from sensorgen.export.gcode import motion as paths
 from sensorgen.export.gcode.check import check
 from sensorgen.export.slicers import cura, prusa, versions
 from sensorgen.export.slicing import Placed, alone, sliced

@@ -13,7 +13,7 @@ from cura_settings import write
 from windows import Screen, opened, saved, until
 
 from sensorgen.design import design, materials
-from sensorgen.design.tower import tower
+from sensorgen.design.printer import tower
 from sensorgen.export import slicing
 from sensorgen.export.slicers import cura, prusa
 from sensorgen.export.slicers.loads import recipes

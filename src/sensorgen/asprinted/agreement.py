@@ -14,9 +14,9 @@ from sensorgen.asprinted.beads import Beads, beads
 from sensorgen.asprinted.registration import connected, pieces
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.design.design import Design
-from sensorgen.design.tower import PRIME_MM3
+from sensorgen.design.printer import PRIME_MM3
+from sensorgen.export.gcode.motion import NOT_MODEL, Paths
 from sensorgen.export.gcode.moves import NO_TOOL, Motion, ToolChange
-from sensorgen.export.gcode.paths import NOT_MODEL, Paths
 from sensorgen.export.gcode.results import GcodeFinding
 from sensorgen.scene.layers import LayerRegions, Region
 from sensorgen.scene.scene import Point

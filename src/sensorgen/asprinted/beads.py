@@ -1,8 +1,9 @@
 """Layer regions from a slicer's G-code: lines, the body that each belongs to, and the polygons that they fill."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, parts
 from sensorgen.scene.scene import SLIVER_MM, Point
 
 if TYPE_CHECKING:
-    from sensorgen.export.gcode.paths import Paths
+    from sensorgen.export.gcode.motion import Paths
 
 CONVENTIONS = ("vol", "deposit", "stadium")
 FULL = 0.95  # a plate of which this share is filled has no holes but between rounded lines
@@ -125,13 +126,18 @@ def _owners(design: Design, tool: Whole, layer: Whole, middle_mm: Real) -> Whole
             rows = np.flatnonzero((tool == one) & (layer == number))
             near = sorted(layers, key=lambda each: abs(each.bottom_mm - layers[number].bottom_mm))
             each = next(each for each in near if mine.keys() & each.regions.keys())
-            shown = {name: region for name, region in each.regions.items() if name in mine}
-            numbers = np.array([mine[name] for name in shown])
-            pieces = [parts(region) for region in shown.values()]
-            tree = shapely.STRtree([piece for each in pieces for piece in each])
-            owners = np.repeat(numbers, [len(each) for each in pieces])
-            body[rows] = owners[tree.nearest(shapely.points(middle_mm[rows]))] if len(shown) > 1 else numbers[0]
+            shown = {mine[name]: region for name, region in each.regions.items() if name in mine}
+            body[rows] = _nearest(shown, middle_mm[rows])
     return body
+
+
+def _nearest(regions: Mapping[int, Region], places_mm: Real) -> Whole:
+    """Number of the region that is nearest to each place, (n,)."""
+    if len(regions) == 1:
+        return np.full(len(places_mm), next(iter(regions)))
+    pieces = [parts(region) for region in regions.values()]
+    owners = np.repeat([*regions], [len(each) for each in pieces])
+    return np.asarray(owners[shapely.STRtree([*chain.from_iterable(pieces)]).nearest(shapely.points(places_mm))])
 
 
 def _inside(start_mm: Real, end_mm: Real, size_mm: Real) -> tuple[list[Real], Real]:

@@ -18,7 +18,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
-from sensorgen.export.gcode.paths import Paths
+from sensorgen.export.gcode.motion import Paths
 from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, drawn, parts
 from sensorgen.scene.scene import Point
@@ -105,7 +105,7 @@ def films(design: Design, lines: Beads) -> list[CoveredFilm]:
     whole = [sum(layer.region(name).area for name in names) > _WHOLE * plan for layer in plates]
     runs = []
     for run in np.split(np.arange(len(plates)), np.flatnonzero(np.diff(whole)) + 1):
-        layers = [int(k) for k in run]
+        layers = run.tolist()
         below = set(terminal[lines.body[lines.layer < layers[0]]].tolist()) - {""}
         above = set(terminal[lines.body[lines.layer > layers[-1]]].tolist()) - {""}
         if not whole[layers[0]] or not below or not above:
@@ -136,8 +136,12 @@ def through(layers: Sequence[Region]) -> list[Polygon]:
     connected set of them the overlaps between those two layers count where they have the least area together.
     """
     pieces = [[p for p in parts(layer) if p.area > _LEAST_MM2] for layer in layers]
-    if len(layers) == 1:
-        return [hole for hole in pieces[0] if hole.area > HOLE_MM2]
+    holes = pieces[0] if len(layers) == 1 else _narrowest(pieces)
+    return [hole for hole in holes if hole.area > HOLE_MM2]
+
+
+def _narrowest(pieces: Sequence[Sequence[Polygon]]) -> list[Polygon]:
+    """Narrowest places of every path through the open places of two layers or more."""
     first = np.cumsum([0, *map(len, pieces)])
     throats = []  # between two layers: overlaps, and the open places that each connects
     for k, (lower, upper) in enumerate(pairwise(pieces)):
@@ -152,7 +156,7 @@ def through(layers: Sequence[Region]) -> list[Polygon]:
     for one in set(of[: first[1]].tolist()) & set(of[first[-2] :].tolist()):
         between = [over[of[ends[0]] == one] for over, ends in throats]
         holes += [p for place in min(between, key=lambda over: shapely.area(over).sum()) for p in parts(place)]
-    return [hole for hole in holes if hole.area > HOLE_MM2]
+    return holes
 
 
 def pinholes(

@@ -8,9 +8,8 @@ import numpy as np
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design
-from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.motion import Paths, follow, paths_of
 from sensorgen.export.gcode.moves import Motion
-from sensorgen.export.gcode.paths import Paths, paths_of
 from sensorgen.export.gcode.reading import Source
 from sensorgen.scene.scene import Point
 
@@ -82,27 +81,31 @@ def pieces(design: Design, motion: Motion) -> list[PlacedPiece]:
     boxes = [np.array([low[group == k].min(0), high[group == k].max(0)]) for k in np.unique(group).tolist()]
     size = np.array(design.printed.size_mm[:2]) - design.machine.line_mm()  # lines run half a line inside
     off = np.array([[abs(box[1] - box[0] - wanted).max() for wanted in (size, size[::-1])] for box in boxes])
-    fits = [bool((each < WITHIN_MM).any()) for each in off]
-    if not any(fits):
-        line = design.machine.line_mm()
-        there = "; ".join(
-            f"{w + line:.4g} x {h + line:.4g} mm at x {x:.4g}, y {y:.4g} on the bed"
-            for (w, h), (x, y) in sorted({(tuple(b[1] - b[0]), tuple(b.mean(0))) for b in boxes})[:3]
-        )
-        length, width, _ = design.printed.size_mm
-        raise BadInput(
-            f"no piece of {length:g} x {width:g} mm, as {design.name}, in this G-code; it prints {there}, off by "
-            f"{off.min(initial=np.inf):.3g} mm at least: was it sliced from this design, straight or turned by 90 "
-            "degrees?"
-        )
-    straight, found = off[:, 0] < WITHIN_MM, []  # a square one counts as straight
+    fits = (off < WITHIN_MM).any(1) if len(boxes) else np.zeros(0, bool)
+    if not fits.any():
+        raise _other_sizes(design, boxes, off.min(initial=np.inf))
+    straight, count, found = off[:, 0] < WITHIN_MM, int(fits.sum()), []  # a square one counts as straight
     turned = paths if straight[fits].all() else _turned(paths)
-    for box, is_straight in ((box, straight[k]) for k, box in enumerate(boxes) if fits[k]):
-        x, y = (float(v) for v in box.mean(0))
+    for k in np.flatnonzero(fits).tolist():
+        x, y = boxes[k].mean(0).tolist()
         found.append(
-            PlacedPiece(paths if is_straight else turned, (x, y) if is_straight else (y, -x), (x, y), sum(fits))
+            PlacedPiece(paths, (x, y), (x, y), count) if straight[k] else PlacedPiece(turned, (y, -x), (x, y), count)
         )
     return found
+
+
+def _other_sizes(design: Design, boxes: Sequence[Real], off_mm: float) -> BadInput:
+    """Error of a file whose pieces (2, 2) are none of a design's size."""
+    line = design.machine.line_mm()
+    there = "; ".join(
+        f"{w + line:.4g} x {h + line:.4g} mm at x {x:.4g}, y {y:.4g} on the bed"
+        for (w, h), (x, y) in sorted({(tuple(b[1] - b[0]), tuple(b.mean(0))) for b in boxes})[:3]
+    )
+    length, width, _ = design.printed.size_mm
+    return BadInput(
+        f"no piece of {length:g} x {width:g} mm, as {design.name}, in this G-code; it prints {there}, off by "
+        f"{off_mm:.3g} mm at least: was it sliced from this design, straight or turned by 90 degrees?"
+    )
 
 
 def _tools(design: Design) -> list[int]:

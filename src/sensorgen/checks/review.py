@@ -9,7 +9,7 @@ from sensorgen.core.display import Displayed
 from sensorgen.core.document import Part, Table, comma_separated
 from sensorgen.core.findings import Finding, Verdict, counted, counts, headline, listed, table, verdict
 from sensorgen.design.design import Design
-from sensorgen.design.tower import tower
+from sensorgen.design.printer import tower
 from sensorgen.design.walls import rule
 from sensorgen.scene.geometry import meshes
 from sensorgen.scene.geometry.meshes import Mesh

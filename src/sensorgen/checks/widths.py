@@ -11,13 +11,14 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import groupby, pairwise
+from itertools import compress, groupby, pairwise
 from math import inf
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Mask
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.scene.layers import Region, are_boxes, drawn, is_rectilinear, narrow_mm, region_at
@@ -156,7 +157,8 @@ def check(slices: Slices, printer: Printer) -> Iterator[Finding]:
                 across = stretches(region, bands[-1].upto_mm)
                 known[id(region)] = across, stretches(region, closes - 3 * TOUCH_MM, gaps=True)
             across, between = known[id(region)]
-            narrow += [_Narrow(band, layer, mid, here) for band, here in _by_band(bands, body, layer, across, slices)]
+            by_band = _by_band(bands, body, layer, across, slices)
+            narrow += [_Narrow(band, layer, mid, here) for band, here in by_band if here]
             gaps += [_Narrow(gap, layer, mid, between)] if between else []
         yield from _findings("5-width", body, narrow)
         yield from _findings("6-gap", body, gaps)
@@ -171,14 +173,12 @@ def _by_band(
         here = [s for s in across if least < s.width_mm <= most]
         if band.severity == "error" and here:
             tapers = _tapers(here, body, layer, slices)
-            if tips := [s for s, ends in zip(here, tapers, strict=True) if ends]:
-                yield replace(band, severity="warning", noun="tip"), tips
-            here = [s for s, ends in zip(here, tapers, strict=True) if not ends]
-        if here:
-            yield replace(band, severity="warning") if band.severity == "error" and body.is_support() else band, here
+            yield replace(band, severity="warning", noun="tip"), list(compress(here, tapers))
+            here = list(compress(here, ~tapers))
+        yield replace(band, severity="warning") if band.severity == "error" and body.is_support() else band, here
 
 
-def _tapers(here: Sequence[Stretch], body: Body, layer: int, slices: Slices) -> list[bool]:
+def _tapers(here: Sequence[Stretch], body: Body, layer: int, slices: Slices) -> Mask:
     """Mark tips, which lose half of their width up to the layer's boundary, and so all of it up to the next sample."""
     half = slices.layers.mids_mm[layer] - slices.layers.boundaries_mm[layer]
     width, middle, way = (np.array([getattr(s, k) for s in here]) for k in ("width_mm", "middle_mm", "way"))
@@ -190,8 +190,7 @@ def _tapers(here: Sequence[Stretch], body: Body, layer: int, slices: Slices) -> 
         line, part = shapely.STRtree(polygons).query(lines)
         inside = shapely.length(shapely.intersection(lines[line], polygons[part]))
         lengths.append(np.bincount(line, inside, len(lines)))
-    tips: list[bool] = (abs(lengths[1] - lengths[0]) / 2 / _NEAR > 0.49 * width).tolist()
-    return tips
+    return np.asarray(abs(lengths[1] - lengths[0]) / 2 / _NEAR > 0.49 * width)
 
 
 def _findings(rule: str, body: Body, narrow: Sequence[_Narrow]) -> Iterator[Finding]:

@@ -105,9 +105,9 @@ def _drags(subject: Subject) -> "Documented":
     """
     drawn, machine = subject.loaded()
     if drawn:
-        from sensorgen.asprinted import strands
+        from sensorgen.asprinted import nozzle
 
-        return strands.drags(drawn, subject.file)
+        return nozzle.drags(drawn, subject.file)
     from sensorgen.export.gcode import drags
 
     return drags.drags(subject.file, machine)

@@ -1,8 +1,10 @@
-"""Printers and print qualities, read from data: tools, nozzle, layers, bed."""
+"""Printers and print qualities, read from data: tools, nozzle, layers, bed; and the place of the prime tower."""
 
+import math
 import os
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Literal, Self, TypeVar, cast
@@ -278,3 +280,45 @@ def _parsed(kind: type[_Profile], file: str, text: str) -> _Profile:
 def _safe(stem: str) -> str:
     """A file's name as part of the names of other files, and in a slicer's profile."""
     return re.sub("[^A-Za-z0-9._-]+", "-", stem)[:60].strip("._-") or "own"
+
+
+PRIME_MM3 = 15.0  # what PrusaSlicer takes a nozzle to need before its pressure is steady
+MARGIN_MM = 10.0  # of the tower to the edges of the bed: the skirt goes round it too
+
+
+@dataclass(frozen=True)
+class Tower:
+    """Prime tower, which no sensor may touch: a square on the bed, its front left corner and its side [mm].
+
+    The Diabase lifts by 40 mm for a tool change and the nozzle oozes meanwhile; without priming the first lines of each
+    layer would be missing. Coordinates are the printer's own.
+    """
+
+    x_mm: float
+    y_mm: float
+    side_mm: float
+
+
+def tower(printer: Printer, quality: Quality, tools: int) -> Tower:
+    """Place of the prime tower, in the far right corner of the bed.
+
+    Parameters
+    ----------
+    printer, quality : Printer, Quality
+        Their bed and their thinnest layer: priming a volume takes area over height.
+    tools : int
+        How many tools print [-].
+
+    Returns
+    -------
+    Tower
+        Its square; wide enough for a round tower (Cura's), hence for a rectangular one.
+    """
+    area_mm2 = tools * PRIME_MM3 / min(quality.layer_mm, quality.first_layer_mm)
+    side_mm = float(math.ceil(2 * math.sqrt(area_mm2 / math.pi)))
+    centre_x, centre_y = printer.bed_centre_mm()
+    return Tower(
+        x_mm=centre_x + printer.bed_mm[0] / 2 - MARGIN_MM - side_mm,
+        y_mm=centre_y + printer.bed_mm[1] / 2 - MARGIN_MM - side_mm,
+        side_mm=side_mm,
+    )

@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from sensorgen.core import files as store
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, SlicerFailed, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
-from sensorgen.design.tower import tower
+from sensorgen.design.printer import tower
 from sensorgen.export import threemf
 from sensorgen.export.gcode.drags import Lifted, lift
-from sensorgen.export.gcode.motion import follow
-from sensorgen.export.gcode.paths import Paths, paths_of
+from sensorgen.export.gcode.motion import Paths, follow, paths_of
 from sensorgen.export.gcode.reading import text_of
 from sensorgen.export.gcode.ready import ready
-from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, curaengine, prusa, run, versions
+from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, cura, prusa, run, versions
 from sensorgen.export.slicers.loads import ToolLoad, loads
 from sensorgen.export.slicers.run import Runner, find
 from sensorgen.export.threemf.core import part_of, parts_of
@@ -245,36 +245,47 @@ def _run(
     pieces: Sequence[Placed], bodies: list[threemf.Part], slicer: str, raw: Path, runner: Runner, title: str
 ) -> tuple[float, set[str]]:
     """Write what the slicer reads beside its file, and run it: its time [s], and the settings that it does not know."""
-    design, all_loads, folder = pieces[0].design, plate_loads(pieces), raw.parent
+    design, all_loads = pieces[0].design, plate_loads(pieces)
     program = find(*PROGRAMS[slicer], runner.program)
     version = versions.of_program(slicer, program)
-    folder.mkdir(parents=True, exist_ok=True)
+    raw.parent.mkdir(parents=True, exist_ok=True)
     if slicer == "prusa":
-        plate, profile = folder / "plate.3mf", folder / "profile.ini"
-        named = title or " ".join(piece.name for piece in pieces)[:80]
-        primed = tower(design.machine, design.layers, len(all_loads))
         text = prusa.profile(design.machine, design.layers, all_loads, version)
-        plate.write_bytes(threemf.plate("prusa", named, bodies, _corner_mm(design), primed, text))
-        profile.write_text(text, "utf-8")
-        before = time.perf_counter()
-        prusa.slice_3mf(plate, profile, raw, runner)
-        seconds = time.perf_counter() - before
-        known = prusa.settings(text_of(raw)[-_TAIL:].decode("utf-8", "replace"))
-        not_known = prusa.settings(text).keys() - known.keys() if known else set()
-    else:
-        settings = curaengine.engine_settings(design.machine, design.layers, all_loads, version)
-        # The engine primes in the first layer only the tool that prints the skirt: that of what lies on the bed
-        lowest = min(bodies, key=lambda part: (part.mesh.vertices_mm[:, 2].min(initial=np.inf), part.extruder))
-        of_skirt = {key: str(lowest.extruder) for key in curaengine.OF_SKIRT if key in settings.common}
-        settings = replace(settings, common=settings.common | of_skirt)
-        shift_mm = np.array([-c for c in design.machine.bed_centre_mm()] + [0.0])
-        files = [(folder / f"{part.name}.stl", part) for part in bodies]
-        for path, part in files:
-            path.write_bytes(run.content(part.mesh, shift_mm))
-        before = time.perf_counter()
-        curaengine.slice_bodies([(path, part.extruder) for path, part in files], settings, raw, runner)
-        seconds, not_known = time.perf_counter() - before, curaengine.unknown(settings, program)
-    return seconds, not_known
+        primed = tower(design.machine, design.layers, len(all_loads))
+        named = title or " ".join(piece.name for piece in pieces)[:80]
+        plate = threemf.plate("prusa", named, bodies, _corner_mm(design), primed, text)
+        return _run_prusa(plate, text, raw, runner)
+    settings = cura.engine_settings(design.machine, design.layers, all_loads, version)
+    shift_mm = np.array([-c for c in design.machine.bed_centre_mm()] + [0.0])
+    return _run_cura(bodies, settings, shift_mm, raw, replace(runner, program=program))
+
+
+def _run_prusa(plate: bytes, profile: str, raw: Path, runner: Runner) -> tuple[float, set[str]]:
+    """Run PrusaSlicer on a 3MF, with a profile's text."""
+    files = raw.with_name("plate.3mf"), raw.with_name("profile.ini")
+    files[0].write_bytes(plate)
+    files[1].write_text(profile, "utf-8")
+    before = time.perf_counter()
+    prusa.slice_3mf(*files, raw, runner)
+    seconds = time.perf_counter() - before
+    known = prusa.settings(text_of(raw)[-_TAIL:].decode("utf-8", "replace"))
+    return seconds, prusa.settings(profile).keys() - known.keys() if known else set()
+
+
+def _run_cura(
+    bodies: Sequence[threemf.Part], settings: cura.EngineSettings, shift_mm: Real, raw: Path, runner: Runner
+) -> tuple[float, set[str]]:
+    """Run CuraEngine on bodies, moved to where it has the middle of the bed."""
+    # The engine primes in the first layer only the tool that prints the skirt: that of what lies on the bed
+    lowest = min(bodies, key=lambda part: (part.mesh.vertices_mm[:, 2].min(initial=np.inf), part.extruder))
+    of_skirt = {key: str(lowest.extruder) for key in cura.OF_SKIRT if key in settings.common}
+    settings = replace(settings, common=settings.common | of_skirt)
+    files = [(raw.parent / f"{part.name}.stl", part) for part in bodies]
+    for path, part in files:
+        path.write_bytes(run.content(part.mesh, shift_mm))
+    before = time.perf_counter()
+    cura.slice_bodies([(path, part.extruder) for path, part in files], settings, raw, runner)
+    return time.perf_counter() - before, cura.unknown(settings, runner.program)
 
 
 def _version(text: bytes, slicer: str) -> str:

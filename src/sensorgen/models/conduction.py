@@ -88,7 +88,7 @@ def electrode_resistance(
     alone = Scene(bodies, scene.size_mm)
     if not alone.bodies:
         raise OutOfRange(f"no {terminal} electrode in this scene: its resistance is not defined")
-    spans = np.array([p.span(axis) for b in alone.bodies for p in b.pieces])
+    spans = np.array([p.span(axis) for _, p in alone.pieces])
     low, high, end = spans[:, 0].min(), spans[:, 1].max(), alone.size_mm["xyz".index(axis)]
     if low > ROUNDING_MM or high < end - ROUNDING_MM:
         raise OutOfRange(
@@ -112,21 +112,25 @@ def _per_resistivity(alone: Scene, axis: str, width: float) -> Interval:
     along = square_to(alone, "y" if axis == "x" else "x")
     if len(along) == 1:
         return _best(_in_plane(alone, along[0], width), simple)
-    if all(p.is_box() for b in alone.bodies for p in b.pieces):
-        # Kept on disk: a cell of boxes takes a third of a second.
-        look = [content(p) for b in alone.bodies for p in b.pieces]
-        key = sha256(dumps([look, alone.size_mm]).encode()).hexdigest()
-        question = {"what": "conduction", "scene": key, "axis": axis, "width": width}
-        bounds = cached.known(question)
-        if bounds is None:
-            bounds = [(step.lower, step.upper) for step in _in_space(alone, axis, width)]
-            cached.keep(question, bounds)
-        simple = _best((Interval(*ends) for ends in bounds), simple)
+    if all(p.is_box() for _, p in alone.pieces):
+        simple = _best((Interval(*ends) for ends in _known_in_space(alone, axis, width)), simple)
     if simple.upper == np.inf:
         raise _interrupted(
             alone, axis, "no piece of it runs unchanged from end to end; expected a plate under the cogs"
         )
     return simple
+
+
+def _known_in_space(alone: Scene, axis: str, width: float) -> list[tuple[float, float]]:
+    """Bounds of :func:`_in_space`, kept on disk: a cell of boxes takes a third of a second."""
+    look = [content(p) for _, p in alone.pieces]
+    key = sha256(dumps([look, alone.size_mm]).encode()).hexdigest()
+    question = {"what": "conduction", "scene": key, "axis": axis, "width": width}
+    bounds: list[tuple[float, float]] | None = cached.known(question)
+    if bounds is None:
+        bounds = [(step.lower, step.upper) for step in _in_space(alone, axis, width)]
+        cached.keep(question, bounds)
+    return bounds
 
 
 def _interrupted(alone: Scene, axis: str, why: str) -> OutOfRange:
@@ -147,7 +151,7 @@ def _area_mm2(section: Section) -> float:
 def _simple(alone: Scene, axis: str, square: list[Section]) -> Interval:
     """Rayleigh's bounds: perfect conductors in planes square to the axis, insulators around what runs through."""
     length = alone.size_mm["xyz".index(axis)]
-    pieces = [p for b in alone.bodies for p in b.pieces]
+    pieces = [p for _, p in alone.pieces]
     through = [
         p.volume_mm3() for p in pieces if p.is_constant(axis) and np.ptp(p.span(axis)) > length - 2 * ROUNDING_MM
     ]
@@ -188,7 +192,7 @@ def _conducting(band: Band) -> Band:
 def _in_space(alone: Scene, axis: str, width: float) -> Iterator[Interval]:
     """Of boxes: bounds that get narrower [1/mm]; none where their cell has too many."""
     from sensorgen.models.fem3d import narrowed, total
-    from sensorgen.solvers.electrostatics.bricks import insulated
+    from sensorgen.solvers.electrostatics.boxes import insulated
 
     at = "xyz".index(axis)
     try:

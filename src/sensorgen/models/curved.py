@@ -17,7 +17,7 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.layers import Region
 from sensorgen.scene.repetition import Repeat, halved, repeat
-from sensorgen.scene.scene import SLIVER_MM, Piece, Scene
+from sensorgen.scene.scene import SLIVER_MM, Body, Piece, Scene, dielectrics
 from sensorgen.solvers.electrostatics import bounds as fem
 
 SOURCE = "Dirichlet's and Thomson's principles; curved tetrahedra, H1 and hybrid H(div) by NGSolve"
@@ -34,7 +34,7 @@ def why_not_applicable(scene: Scene) -> str | None:
     """Why the model does not apply to a scene, or None."""
     if reason := fem.unmirrored(scene):
         return reason
-    pieces = [piece for body in scene.bodies for piece in body.pieces]
+    pieces = [piece for _, piece in scene.pieces]
     if any(all(piece.is_constant(axis) for piece in pieces) for axis in "xyz"):
         return "its bodies are prisms along one axis: solved by the models of those"
     if find_spec("ngsolve") is None:
@@ -67,15 +67,8 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     own, x, y = cell(scene)
     values = [float(permittivity[name]) for name in own.materials]
     shares = np.outer(x.shares, y.shares)
-    plan = RoundCell(
-        own.low_mm,
-        own.high_mm,
-        own.pieces,
-        len(_ENDS),
-        values,
-        (x.places_mm[1:-1].tolist(), y.places_mm[1:-1].tolist()),
-        shares,
-    )
+    cuts = x.places_mm[1:-1].tolist(), y.places_mm[1:-1].tolist()
+    plan = RoundCell(own.low_mm, own.high_mm, own.pieces, len(_ENDS), values, cuts, shares)
     reached = False
     try:
         for level, elements, energies in bounds(plan, width):
@@ -101,9 +94,7 @@ class MirrorWindow:
 
 def _looks(scene: Scene) -> Iterator[Region]:
     """Regions of each material and terminal, at some heights between any two levels."""
-    levels = sorted(
-        {z for body in scene.bodies for piece in body.pieces for z in (*piece.levels_mm(), *piece.span("z"))}
-    )
+    levels = sorted({z for _, piece in scene.pieces for z in (*piece.levels_mm(), *piece.span("z"))})
     spans = [(bottom, top) for bottom, top in pairwise(levels) if top - bottom > SLIVER_MM]
     for bottom, top in spans:
         for share in _CUTS:
@@ -128,26 +119,29 @@ def cell(scene: Scene) -> tuple[MirrorWindow, Repeat, Repeat]:
     ValueError
         An electrode is missing, the pattern has no mirrors, or the cell has too many bodies.
     """
-    spans = {end: _heights(scene, end) for end in _ENDS}
+    bottom, top = _heights(scene, "bottom"), _heights(scene, "top")
     looks = list(_looks(scene))
-    x, y = (repeat(looks, scene.size_mm[:2], axis) for axis in (0, 1))
+    x, y = repeat(looks, scene.size_mm[:2], 0), repeat(looks, scene.size_mm[:2], 1)
     if x.shifts or y.shifts:
         raise ValueError("the pattern repeats by shifts, not by mirrors")
     x, y = halved((x, y), [shapely.clip_by_rect(r, x.low_mm, y.low_mm, x.high_mm, y.high_mm) for r in looks])
-    low = (x.low_mm, y.low_mm, min(z for z, _ in spans["bottom"]))
-    high = (x.high_mm, y.high_mm, max(z for _, z in spans["top"]))
-    near = [(body, piece) for body in scene.bodies for piece in body.pieces if _lies_in(piece, low, high)]
+    low = (x.low_mm, y.low_mm, min(bottom)[0])
+    high = (x.high_mm, y.high_mm, max(z for _, z in top))
+    near = [(body, piece) for body, piece in scene.pieces if _lies_in(piece, low, high)]
     if len(near) > _MOST:
         raise ValueError(f"its cell has {len(near)} bodies; at most {_MOST} are solved")
-    materials = (*sorted({body.material for body, _ in near if not body.terminal} - {"air"}), "air")
-    kinds = [_ENDS.index(b.terminal) if b.terminal else len(_ENDS) + materials.index(b.material) for b, _ in near]
-    pieces = tuple((piece, kind) for (_, piece), kind in zip(near, kinds, strict=True))
-    return MirrorWindow(low, high, pieces, materials), x, y
+    materials = dielectrics(body for body, _ in near)
+    return MirrorWindow(low, high, tuple((piece, _kind(body, materials)) for body, piece in near), materials), x, y
+
+
+def _kind(body: Body, materials: Sequence[str]) -> int:
+    """Number of a body's conductor, or after all of those, of its dielectric."""
+    return _ENDS.index(body.terminal) if body.terminal else len(_ENDS) + materials.index(body.material)
 
 
 def _heights(scene: Scene, end: str) -> list[tuple[float, float]]:
     """Bottom and top of each piece of an electrode [mm]; raises ValueError where it has none."""
-    spans = [piece.span("z") for body in scene.bodies if body.terminal == end for piece in body.pieces]
+    spans = [piece.span("z") for body, piece in scene.pieces if body.terminal == end]
     if not spans:
         raise ValueError(f"the scene has no {end} electrode")
     return spans

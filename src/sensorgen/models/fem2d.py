@@ -17,10 +17,9 @@ from sensorgen.scene.sections import Section, sections
 from sensorgen.scene.unit_cell import cell
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.bounds import Fields, Turned, disc, turned
-from sensorgen.solvers.electrostatics.cones import RATIO
-from sensorgen.solvers.electrostatics.corners import exponents, graded
+from sensorgen.solvers.electrostatics.elements import RATIO
 from sensorgen.solvers.electrostatics.elimination import Numbers
-from sensorgen.solvers.electrostatics.mesh import Cones
+from sensorgen.solvers.electrostatics.mesh import Cones, exponents, graded
 from sensorgen.solvers.electrostatics.plane import Field, Plane
 from sensorgen.solvers.electrostatics.triangles import Triangles, triangles
 

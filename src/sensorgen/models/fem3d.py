@@ -6,7 +6,7 @@ docs/cells.md.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -15,10 +15,7 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.bounds import Fields, disc, turned
-from sensorgen.solvers.electrostatics.bricks import Grid, grid, layered
-
-if TYPE_CHECKING:
-    from sensorgen.solvers.electrostatics.boxes import Pair
+from sensorgen.solvers.electrostatics.boxes import Grid, Pair, grid, layered, whole
 
 SOURCE = "Dirichlet's and Thomson's principles; graded boxes, H1 and hybrid H(div), nested dissection"
 COST = 3
@@ -108,8 +105,6 @@ def narrowed(
     Meshes are left out that miss the width if they narrow the bounds as they do on rect, and those too large for the
     memory.
     """
-    from sensorgen.solvers.electrostatics.boxes import Pair
-
     left = list(MESHES)
     while left:
         mesh = left.pop(0)
@@ -125,10 +120,8 @@ def narrowed(
         left = enough or left[-1:]
 
 
-def total(pair: "Pair") -> Interval:
+def total(pair: Pair) -> Interval:
     """Energy at 1 V over eps0 of all that the sensor holds, cut cells among it [mm]."""
-    from sensorgen.solvers.electrostatics.boxes import whole
-
     shares, rho = pair.flux.shares, np.real(pair.flux.eps)
     upper, cut = pair.potential.least().energy, bool(np.ptp(shares))
     flux = pair.flux.least(keep=cut)
@@ -166,7 +159,7 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     values = [0j, 0j, *(complex(permittivity[name]) for name in coarse.names[2:])]
     turn = turned(values[2:])
 
-    def bounds(pair: "Pair") -> Disc:
+    def bounds(pair: Pair) -> Disc:
         u, level = pair.potential.solved(), pair.flux.solved()
         rho = np.array([turn.weight[eps] for eps in pair.flux.eps.tolist()])
         upper, lower = ((x * boxes.answers(x)).sum() for x, boxes in ((u, pair.potential), (level, pair.flux)))

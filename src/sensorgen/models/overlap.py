@@ -4,9 +4,9 @@ Flux that runs straight up where the electrodes overlap bounds the capacitance f
 depends on the height alone over the electrodes, and goes to its mean within some distance beside, above and below them.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from itertools import pairwise, product
+from itertools import chain, pairwise, product
 from math import cos, inf, log, pi
 
 import numpy as np
@@ -87,7 +87,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 
 
 def _heights(scene: Scene, which: str) -> tuple[float, float]:
-    own = [p.span("z") for body in scene.bodies if body.terminal == which for p in body.pieces]
+    own = [p.span("z") for body, p in scene.pieces if body.terminal == which]
     return min(low for low, _ in own), max(high for _, high in own)
 
 
@@ -143,29 +143,25 @@ def _energy(scene: Scene, eps: Mapping[Body, float], air: float, beside_mm: floa
     rings = _rings(scene, beside_mm)
     weight = np.array([1.0, *(((_RINGS - k) / _RINGS) ** 2 for k in range(_RINGS))])  # of w squared: most in each ring
     areas = np.array([ring.area for ring in rings])
-    own = [_heights(scene, end) for end in ("bottom", "top")]
-    floats = [p.span("z") for b in scene.bodies if b.terminal == FLOATING for p in b.pieces]
-    floor, roof = sorted((min(own[0][1], own[1][1]), max(own[0][0], own[1][0])))
-    low, high = (end(z for span in (*own, *floats) for z in span) for end in (min, max))
-    most = max(air, *eps.values()) if eps else air
-    compliance = 0.0  # of the slabs between the electrodes in series
+    bottom, top = _heights(scene, "bottom"), _heights(scene, "top")
+    floats = [p.span("z") for body, p in scene.pieces if body.terminal == FLOATING]
+    floor, roof = sorted((min(bottom[1], top[1]), max(bottom[0], top[0])))
+    heights = [*chain(bottom, top, *floats)]
+    low, high = min(heights), max(heights)
+    most = max((air, *eps.values()))
+    compliance, seen = 0.0, 0.0  # of the slabs between the electrodes in series, and their height
     for slab in slabs(scene):
         thick = min(slab.high_mm, roof) - max(slab.low_mm, floor)
+        seen += max(thick, 0.0)
         if thick > SLIVER_MM and not any(body.terminal == FLOATING for body in slab.outer):
             compliance += thick / float(weight @ _permittivity_areas(slab, rings, areas, eps, air))
-    covered_mm, seen = roof - floor, sum(_overlapping(slabs(scene), floor, roof))
-    compliance += max(covered_mm - seen, 0.0) / float(air * (weight @ areas))  # heights at which there is air alone
+    compliance += max(roof - floor - seen, 0.0) / float(air * (weight @ areas))  # heights at which there is air alone
     between = 1 / compliance if compliance else inf
     outer = most * float(weight @ areas) / (2 * above_mm)
     # Of the way down to the mean beside the conductors: (v - 1/2)^2 over all heights
     tall = (high - low) / 4 + above_mm / 6
     fall = most * tall * float(areas[1:].sum()) / beside_mm**2
     return between + outer + fall
-
-
-def _overlapping(layers: Sequence[Slab], floor: float, roof: float) -> Iterator[float]:
-    for slab in layers:
-        yield max(min(slab.high_mm, roof) - max(slab.low_mm, floor), 0.0)
 
 
 def _permittivity_areas(

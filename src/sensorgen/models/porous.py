@@ -1,11 +1,12 @@
 """Effective permittivity and stiffness of a dielectric that is printed with sparse infill, as bounds."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.scene.layers import overlay_parts
@@ -158,24 +159,31 @@ def filling(scene: Scene, modulus_pa: Mapping[str, float]) -> Filling | None:
         columns = [(part.depth_mm * (c.right_mm - c.left_mm), c) for part in overlay_parts(scene) for c in part.columns]
     except ValueError:
         return None
-    area = np.array([a for a, _ in columns]) / sum(a for a, _ in columns)
+    areas = [a for a, _ in columns]
+    area = np.array(areas) / sum(areas)
     ends = {_gap(column) for _, column in columns}
     if len(ends) != 1 or (gap := ends.pop()) is None:
         return None
-    between = [[one for one in column.layers if not one.body.terminal and _inside(one, gap)] for _, column in columns]
-    levels = sorted({*gap, *(round(z, 9) for of in between for one in of for z in (one.bottom_mm[0], one.top_mm[0]))})
+    levels, moduli = _moduli([column for _, column in columns], gap, modulus_pa)
     height = np.diff(levels)
-    moduli = np.array([[_modulus(of, (a + b) / 2, modulus_pa) for a, b in pairwise(levels)] for of in between])
     with np.errstate(divide="ignore"):
         standing = float(area @ (1 / (height / moduli).sum(axis=1)))
     if not standing:
         return None
     d = gap[1] - gap[0]
-    widest = np.array([_widest_mm(scene, (a + b) / 2) for a, b in pairwise(levels)])
-    stiffer = 4 / 3 * (1 + (widest / (2 * d)) ** 2)
-    flat = float(1 / (height / (stiffer * (area @ moduli))).sum())
+    flat = float(1 / (height / (_shape_factors(scene, levels, d) * (area @ moduli))).sum())
     share = float(area @ ((moduli > 0) @ height)) / d
     return Filling(d, share, Interval(d * standing, d * flat))
+
+
+def _moduli(
+    columns: Sequence[SectionColumn], gap: tuple[float, float], modulus_pa: Mapping[str, float]
+) -> tuple[list[float], Real]:
+    """Heights [mm] at which anything between the electrodes begins or ends, and moduli of columns between them [Pa]."""
+    between = [[one for one in column.layers if not one.body.terminal and _inside(one, gap)] for column in columns]
+    faces = chain.from_iterable((one.bottom_mm[0], one.top_mm[0]) for one in chain.from_iterable(between))
+    levels = sorted({*gap, *(round(z, 9) for z in faces)})
+    return levels, np.array([[_modulus(of, (a + b) / 2, modulus_pa) for a, b in pairwise(levels)] for of in between])
 
 
 def _gap(column: SectionColumn) -> tuple[float, float] | None:
@@ -197,7 +205,11 @@ def _modulus(layers: list[Layer], z: float, modulus_pa: Mapping[str, float]) -> 
     return next((modulus_pa[one.body.material] for one in layers if one.bottom_mm[0] < z < one.top_mm[0]), 0.0)
 
 
-def _widest_mm(scene: Scene, z: float) -> float:
-    """The narrower side of the widest solid at a height [mm]."""
-    spans = [[p.span(axis) for axis in "xyz"] for body in scene.bodies if not body.terminal for p in body.pieces]
-    return max(min(x[1] - x[0], y[1] - y[0]) for x, y, (low, high) in spans if low < z < high)
+def _shape_factors(scene: Scene, levels: Sequence[float], gap_mm: float) -> Real:
+    """Modulus of plates as wide as the widest solid of each level, bonded to both sides, over that of free ones [-]."""
+    spans = [[p.span(axis) for axis in "xyz"] for body, p in scene.pieces if not body.terminal]
+    widest = [
+        max(min(x[1] - x[0], y[1] - y[0]) for x, y, (low, high) in spans if low < (a + b) / 2 < high)
+        for a, b in pairwise(levels)
+    ]
+    return np.asarray(4 / 3 * (1 + (np.array(widest) / (2 * gap_mm)) ** 2))

@@ -141,7 +141,7 @@ def _with_fields(
     Where no gap ends in an apex, the mesh as drawn is carried along until a gap closes: its errors cancel in the rise.
     """
     from sensorgen.solvers.contact import closing, plane_field
-    from sensorgen.solvers.contact.carried import Carried
+    from sensorgen.solvers.contact.plane_field import Carried
 
     mesh, sharp = run.mesh, bool(pressed.apex_m)
     share, rings = _SHARP_FIELD if sharp else _BLUNT_FIELD

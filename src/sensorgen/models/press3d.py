@@ -148,9 +148,8 @@ def _with_fields(
     pressed: Pressed, run: "LoadSteps[BrickMesh]", permittivity: Mapping[str, float], orders: FieldOrders
 ) -> Pressed:
     """Add the capacitance of the deformed boxes; gaps that are shut are boundary open by a little."""
-    from sensorgen.solvers.contact.air import AirMap
     from sensorgen.solvers.contact.bricks import mesh_of
-    from sensorgen.solvers.contact.mapped_field import Folded, MappedField
+    from sensorgen.solvers.contact.mapped_field import AirMap, Folded, MappedField
 
     solid = run.mesh
     whole = mesh_of(solid.bricks, np.ones_like(solid.bricks.fill, dtype=np.bool_))

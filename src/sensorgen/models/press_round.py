@@ -4,7 +4,7 @@ The cell between four mirrors becomes a round one of the same area, and so does 
 checked as press2d does.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from math import atan, ceil, pi, sqrt
@@ -93,17 +93,11 @@ def cell(scene: Scene, fineness: Fineness = USUAL) -> ContactCell:
     why = ""
     for (x, across), (y, along) in product(*([(a, 2), ((a + b) / 2, 1), (b, 2)] for a, b in ((x0, x1), (y0, y1)))):
         plan = _Plan(shapely.box(x0, y0, x1, y1), (x, y), across * along)
-        regions: dict[Region, list[shapely.Polygon]] = {}
         try:
-            for body in scene.bodies:
-                pieces = [p for p in body.pieces if any(p == near for near, _ in window.pieces)]
-                if pieces and body.material != AIR:
-                    own = regions.setdefault(Region(body.material, body.terminal), [])
-                    own += [shapely.Polygon(np.round(o, _DIGITS)) for o in _outlines(pieces, plan, fineness)]
+            whole = _regions(scene, [near for near, _ in window.pieces], plan, fineness)
         except BadInput as error:
             why = why or str(error)
             continue
-        whole = {region: shapely.union_all(own) for region, own in regions.items()}
         return partition(whole, shapely.box(*np.round([0.0, z0, plan.radius_mm(plan.box), z1], _DIGITS)), turned=True)
     raise BadInput(f"{_WANTED}: {why}")
 
@@ -121,6 +115,17 @@ class _Plan:
         return sqrt(self.parts * section.area / pi)
 
 
+def _regions(scene: Scene, near: Sequence[Piece], plan: _Plan, fineness: Fineness) -> dict[Region, shapely.Geometry]:
+    """Regions of a scene's solids in radius and height, of the pieces in its cell [mm]."""
+    outlines: dict[Region, list[shapely.Polygon]] = {}
+    for body in scene.bodies:
+        pieces = [piece for piece in body.pieces if piece in near]
+        if pieces and body.material != AIR:
+            own = outlines.setdefault(Region(body.material, body.terminal), [])
+            own += [shapely.Polygon(np.round(o, _DIGITS)) for o in _outlines(pieces, plan, fineness)]
+    return {region: shapely.union_all(own) for region, own in outlines.items()}
+
+
 def _outlines(pieces: Sequence[Piece], plan: _Plan, fineness: Fineness) -> list[list[Point]]:
     """Outlines of a body in radius and height [mm]."""
     outlines: list[list[Point]] = []
@@ -136,14 +141,18 @@ def _outlines(pieces: Sequence[Piece], plan: _Plan, fineness: Fineness) -> list[
         if axis.distance(shapely.Point(plan.axis)) > _SAME_MM or reach > room + _SAME_MM:
             raise BadInput("a body of revolution is not about the cell's axis, or reaches beyond it")
         outlines.append(corners)
-    for low, high in pairwise(sorted({z for piece in flat for z in piece.levels_mm()})):
-        first, middle, last = (_radius(flat, plan, low + share * (high - low)) for share in (0.25, 0.5, 0.75))
+    return [*outlines, *_frusta(flat, plan)]
+
+
+def _frusta(pieces: Sequence[Piece], plan: _Plan) -> Iterator[list[Point]]:
+    """Outlines of bodies with flat faces, as wide at each height as round ones of their area [mm]."""
+    for low, high in pairwise(sorted({z for piece in pieces for z in piece.levels_mm()})):
+        first, middle, last = (_radius(pieces, plan, low + share * (high - low)) for share in (0.25, 0.5, 0.75))
         if abs(first + last - 2 * middle) > _BENT * middle:
             raise BadInput("a body's flanks are not straight")
         if middle:
             a, b = (middle + end * (last - first) for end in (-1, 1))
-            outlines.append([(0.0, low), (a, low), (b, high), (0.0, high)])
-    return outlines
+            yield [(0.0, low), (a, low), (b, high), (0.0, high)]
 
 
 def _radius(pieces: Sequence[Piece], plan: _Plan, z_mm: float) -> float:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.util import find_spec
-from itertools import pairwise, product
+from itertools import chain, pairwise, product
 
 import numpy as np
 import shapely
@@ -22,7 +22,7 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, parts
 from sensorgen.scene.repetition import Repeat, halved, raster, repeat, widened
-from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene
+from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, dielectrics
 from sensorgen.scene.slabs import Slab, is_open, slabs
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, LayerCell, PrismMesh, plan, solved
@@ -163,7 +163,7 @@ class _Cell:
         What fills each layer: conductors from 0, then dielectrics; air is left out.
     conductors : int
         How many there are.
-    dielectrics : list of str
+    dielectrics : tuple of str
         Their materials, air last.
     gap_mm : float
         Smallest distance of two conductors [mm].
@@ -180,7 +180,7 @@ class _Cell:
     heights_mm: tuple[float, ...]
     regions: list[dict[int, Region]]
     conductors: int
-    dielectrics: list[str]
+    dielectrics: tuple[str, ...]
     gap_mm: float
     air_mm: float = 0.0
     open_sides: tuple[tuple[bool, bool], tuple[bool, bool]] = ((False, False), (False, False))
@@ -222,7 +222,7 @@ class _Cell:
 @lru_cache(maxsize=8)
 def _cell(scene: Scene) -> _Cell:
     """The cell of a scene; raises ValueError where it is none of upright prisms between two electrodes."""
-    slanted = next((b for b in scene.bodies for p in b.pieces if not p.is_constant("z")), None)
+    slanted = next((b for b, p in scene.pieces if not p.is_constant("z")), None)
     if slanted and is_open(scene) and not any(scene.repeats):
         return _enclosed(scene)
     if slanted:
@@ -245,7 +245,7 @@ def _levels(layers: Sequence[Slab]) -> list[float]:
 
 def _sides(scene: Scene, patterned: Sequence[Region]) -> tuple[Repeat, Repeat]:
     """The repeating part along x and y, by what its regions show, or of boxes by their planes."""
-    if any(scene.repeats) or not all(p.is_box() for body in scene.bodies for p in body.pieces):
+    if any(scene.repeats) or not all(p.is_box() for _, p in scene.pieces):
         x, y = (
             Repeat.of(0.0, scene.size_mm[axis], True, scene.size_mm[axis])
             if scene.repeats[axis]
@@ -310,7 +310,7 @@ def _enclosed(scene: Scene) -> _Cell:
     """A scene with slanted bodies whose electrodes do not cover it: what each slab has at all heights, and at any."""
     layers = slabs(scene)
     floating = [body for body in scene.bodies if body.terminal == FLOATING]
-    names = [*sorted({b.material for b in scene.bodies if not b.terminal} - {"air"}), "air"]
+    names = dielectrics(scene.bodies)
     ends, conductors = {"bottom": BOTTOM, "top": TOP}, 2 + len(floating)
 
     def kind(body: Body) -> int:
@@ -366,10 +366,7 @@ def _numbered(
     plans = np.array([part for *_, part in pieces])
     slab, count = np.array([k for k, *_ in pieces]), len(pieces)
     sizes = (x.high_mm - x.low_mm, y.high_mm - y.low_mm)
-    images = [(0.0, 0.0), *((sizes[0], 0.0),) * x.shifts, *((0.0, sizes[1]),) * y.shifts]
-    images += [sizes] * (x.shifts and y.shifts)
-    every = np.concatenate([shapely.transform(plans, lambda p, to=to: p + to) for to in images])
-    one, other = shapely.STRtree(every).query(every, predicate="dwithin", distance=SLIVER_MM) % max(count, 1)
+    one, other = _touching(plans, sizes, (x.shifts, y.shifts))
     near = abs(slab[one] - slab[other]) < 2
     kinds = _conductors(groups(count, one[near], other[near]).tolist(), [terminal for _, terminal, _ in pieces])
     conductors = len({BOTTOM, TOP, *kinds.tolist()})
@@ -377,7 +374,7 @@ def _numbered(
     low, high = int(slab[kinds == BOTTOM].min()), int(slab[kinds == TOP].max())
     if uncovered:  # the field leaves the electrodes
         low, high = 0, len(inside) - 1
-    names = [*sorted({b.material for own in inside[low : high + 1] for b in own if not b.terminal} - {"air"}), "air"]
+    names = dielectrics(chain.from_iterable(inside[low : high + 1]))
     regions = []
     for k in range(low, high + 1):
         here = kinds[slab == k]
@@ -388,6 +385,14 @@ def _numbered(
     if uncovered and not air_mm:
         raise _Uncovered(uncovered, gap_mm)
     return _Cell(x, y, heights, regions, conductors, names, gap_mm, air_mm)
+
+
+def _touching(plans: np.ndarray, sizes_mm: tuple[float, float], shifts: tuple[bool, bool]) -> Whole:
+    """Pairs of plans (2, n) that touch, also across sides beyond which the pattern goes on by shifts."""
+    ways = product(*((0.0, size) if shifted else (0.0,) for size, shifted in zip(sizes_mm, shifts, strict=True)))
+    every = np.concatenate([shapely.transform(plans, lambda p, to=to: p + to) for to in ways])
+    pairs = shapely.STRtree(every).query(every, predicate="dwithin", distance=SLIVER_MM)
+    return np.asarray(pairs % max(len(plans), 1))
 
 
 def _dielectrics(own: Mapping[Body, Region], first: int, names: Sequence[str]) -> dict[int, Region]:

@@ -76,7 +76,7 @@ def _one_period(scene: "Scene") -> "tuple[Scene, float]":
     from shapely import clip_by_rect
     from shapely.affinity import translate
 
-    from sensorgen.asprinted.window import window
+    from sensorgen.asprinted.printed import window
     from sensorgen.scene.layers import drawn as layers
     from sensorgen.scene.layers import scene_of
 
@@ -98,7 +98,7 @@ def _one_period(scene: "Scene") -> "tuple[Scene, float]":
 
 def _inside(design: Design, whole: Cells) -> Cells:
     """Cells of a rectangle, counted inside the border of a design."""
-    from sensorgen.asprinted.window import window
+    from sensorgen.asprinted.printed import window
     from sensorgen.design import borders
     from sensorgen.scene.border import share
 

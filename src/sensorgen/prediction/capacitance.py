@@ -118,7 +118,7 @@ def _bands(scene: Scene) -> Size:
 
 def _boxes(scene: Scene) -> Size:
     """Boxes between the electrodes."""
-    from sensorgen.solvers.electrostatics.bricks import grid
+    from sensorgen.solvers.electrostatics.boxes import grid
 
     return Size(int((grid(scene).fill > 1).sum()), is_cut=False)
 

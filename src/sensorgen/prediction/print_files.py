@@ -56,12 +56,12 @@ class PrintFile:
     def printed(self, design: Design) -> "Printed":
         """Body that the lines print."""
         from sensorgen.asprinted import printed as asprinted
-        from sensorgen.export.gcode import paths
+        from sensorgen.export.gcode import motion
 
         key = (self.record["sha256"], self.source, design.id())
         if key not in _LAST:  # pictures, pages and the prediction of one print ask in turn
             _LAST.clear()
-            _LAST[key] = asprinted.body(design, paths.read(self.content, design.machine), slicer=self.source)
+            _LAST[key] = asprinted.body(design, motion.read(self.content, design.machine), slicer=self.source)
         return _LAST[key]
 
 

@@ -56,8 +56,7 @@ def _inside(piece: Piece, region: shapely.Polygon) -> Iterator[Piece]:
             yield Prism("z", outline, low, high)
         return
     from sensorgen.scene.geometry.meshes import mesh
-    from sensorgen.scene.geometry.recognition import pieces
-    from sensorgen.scene.geometry.surfaces import shells_of
+    from sensorgen.scene.geometry.surfaces import pieces, shells_of
 
     low, high = piece.span("z")
     tool = [Prism("z", outline, low - 1, high + 1) for outline in outlines(region)]

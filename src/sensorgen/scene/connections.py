@@ -6,12 +6,13 @@ edge or a corner touch.
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 import shapely
 
 from sensorgen.core.arrays import Real, Whole
-from sensorgen.scene.layers import LayerRegions, parts
+from sensorgen.scene.layers import LayerRegions, Region, parts
 from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Piece, Scene, shadow
 
 Conducts = Callable[[str], bool]  # whether a material, by its name, does
@@ -65,6 +66,12 @@ class _Pieces:
     bodies: list[Body]
     outlines: np.ndarray
     spans_mm: Real
+
+    @classmethod
+    def along(cls, axis: str, pieces: Sequence[tuple[Body, Piece]]) -> "_Pieces":
+        """Prisms along an axis, each with its body."""
+        outlines = np.array([shapely.Polygon(shadow(p, axis)) for _, p in pieces])
+        return cls([body for body, _ in pieces], outlines, np.array([p.span(axis) for _, p in pieces]))
 
     def touching(self) -> Whole:
         """Pairs of pieces (2, n) that touch."""
@@ -137,18 +144,13 @@ def connected_layers(layers: Sequence[LayerRegions], bodies: Sequence[Body], con
     conducts : callable
         Whether a material does.
     """
-    named = {body.name: body for body in bodies if body.terminal or conducts(body.material)}
-    pieces = [
-        (number, named[name], part)
-        for number, layer in enumerate(layers)
-        for name, region in layer.regions.items()
-        if name in named
-        for part in parts(region)
-    ]
+    named = {body.name: body for body in bodies if _is_conductor(body, conducts)}
+    pieces = list(_parts(layers, named))
     if not pieces:
         return Connected(tuple(layers), tuple(bodies), ())
-    spans = np.array([(layers[number].bottom_mm, layers[number].top_mm) for number, _, _ in pieces])
-    conductors = _Pieces([body for _, body, _ in pieces], np.array([part for *_, part in pieces]), spans)
+    numbers, owners, outlines = zip(*pieces, strict=True)
+    spans = np.array([(layers[number].bottom_mm, layers[number].top_mm) for number in numbers])
+    conductors = _Pieces(list(owners), np.array(outlines), spans)
     terminals, pairs, floating = conductors.terminals()
     renamed: dict[tuple[str, str], Body] = {}
     regions: list[dict[str, list[shapely.Polygon]]] = [{} for _ in layers]
@@ -158,6 +160,13 @@ def connected_layers(layers: Sequence[LayerRegions], bodies: Sequence[Body], con
     renamed_layers = [_replaced(layer, named.keys(), here) for layer, here in zip(layers, regions, strict=True)]
     others = [own for (name, terminal), own in renamed.items() if named[name].terminal != terminal]
     return Connected(tuple(renamed_layers), (*bodies, *others), tuple(_shorts(conductors, pairs)), floating)
+
+
+def _parts(layers: Sequence[LayerRegions], named: Mapping[str, Body]) -> Iterator[tuple[int, Body, Region]]:
+    """Connected parts of some bodies in each layer, with the layer's number."""
+    for number, layer in enumerate(layers):
+        for name in filter(named.__contains__, layer.regions):
+            yield from ((number, named[name], part) for part in parts(layer.regions[name]))
 
 
 def _replaced(
@@ -192,19 +201,26 @@ def connected_scene(scene: Scene, conducts: Conducts) -> Scene:
 
     Pieces that are no prisms of one axis are left as they are.
     """
-    pieces = [(b, p) for b in scene.bodies if b.terminal or conducts(b.material) for p in b.pieces]
-    axis = next((n for n in "zyx" if all(p.is_constant(n) for _, p in pieces)), None)
-    if axis is None or not pieces:
+    conducting = [_is_conductor(body, conducts) for body, _ in scene.pieces]
+    pieces = list(compress(scene.pieces, conducting))
+    axis = _axis([piece for _, piece in pieces])
+    if not axis:
         return scene
-    outlines = np.array([shapely.Polygon(shadow(p, axis)) for _, p in pieces])
-    spans = np.array([p.span(axis) for _, p in pieces])
-    terminals, *_ = _Pieces([b for b, _ in pieces], outlines, spans).terminals()
-    if all(body.terminal == terminal for (body, _), terminal in zip(pieces, terminals, strict=True)):
+    terminals, *_ = _Pieces.along(axis, pieces).terminals()
+    if [body.terminal for body, _ in pieces] == terminals:
         return scene
     by_name: dict[str, tuple[Body, list[Piece]]] = {}
     given = iter(terminals)
-    for body in scene.bodies:
-        for piece in body.pieces:
-            own = _as(body, next(given)) if body.terminal or conducts(body.material) else body
-            by_name.setdefault(own.name, (own, []))[1].append(piece)
+    for (body, piece), conductor in zip(scene.pieces, conducting, strict=True):
+        own = _as(body, next(given)) if conductor else body
+        by_name.setdefault(own.name, (own, []))[1].append(piece)
     return replace(scene, bodies=tuple(replace(body, pieces=tuple(own)) for body, own in by_name.values()))
+
+
+def _is_conductor(body: Body, conducts: Conducts) -> bool:
+    return bool(body.terminal or conducts(body.material))
+
+
+def _axis(pieces: Sequence[Piece]) -> str:
+    """The axis along which all of some pieces are prisms, or ""."""
+    return next((axis for axis in "zyx" if all(p.is_constant(axis) for p in pieces)), "") if pieces else ""

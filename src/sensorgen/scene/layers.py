@@ -282,8 +282,7 @@ def overlay_parts(scene: Scene) -> list[OverlayPart]:
     ValueError
         Outlines overlap in plan, or are slanted both in plan and in elevation.
     """
-    every = [p for body in scene.bodies for p in body.pieces]
-    if all((isinstance(p, Prism) and p.axis != "z") or p.is_box() for p in every):
+    if all((isinstance(p, Prism) and p.axis != "z") or p.is_box() for _, p in scene.pieces):
         return [OverlayPart(s.depth_mm, tuple(columns(s)), tuple(alike(s))) for s in sections(scene)]
     patches = _patches(scene)
     return [OverlayPart(1.0, patches, tuple(range(len(patches))), in_plan=True)]
@@ -292,29 +291,27 @@ def overlay_parts(scene: Scene) -> list[OverlayPart]:
 @lru_cache(maxsize=8)
 def _patches(scene: Scene) -> tuple[SectionColumn, ...]:
     """Pieces of the plan over which the same layers lie, those of one look as one."""
-    pieces = [(body, p) for body in scene.bodies for p in body.pieces]
-    slanted = next((body for body, p in pieces if not p.is_constant("z")), None)
-    if slanted:
-        raise ValueError(f"{slanted.name} is slanted or curved in elevation: no column has constant layers")
+    pieces = scene.pieces
     numbers: dict[tuple[str, Point], int] = {}
     kinds = [numbers.setdefault((body.name, p.span("z")), len(numbers)) for body, p in pieces]
-    first = {kind: pieces[k] for k, kind in reversed(list(enumerate(kinds)))}
+    first = dict(zip(reversed(kinds), reversed(pieces), strict=True))
     plans = np.array([_plan(body, p) for body, p in pieces])
     edges = shapely.boundary([*plans, shapely.box(0.0, 0.0, *scene.size_mm[:2])])
     faces = shapely.get_parts(shapely.polygonize([shapely.union_all(edges)]))
-    places = shapely.point_on_surface(faces)
-    over: list[list[int]] = [[] for _ in faces]
-    for face, piece in shapely.STRtree(plans).query(places, predicate="within").T.tolist():
-        over[face].append(piece)
+    over = defaultdict[int, list[int]](list)  # kinds of the pieces over each face
+    for face, piece in shapely.STRtree(plans).query(shapely.point_on_surface(faces), predicate="within").T.tolist():
+        over[face].append(kinds[piece])
     areas: dict[tuple[int, ...], float] = defaultdict(float)
-    for here, area in zip(over, shapely.area(faces).tolist(), strict=True):
-        areas[tuple(sorted(kinds[k] for k in here))] += area
+    for face, area in enumerate(shapely.area(faces).tolist()):
+        areas[tuple(sorted(over[face]))] += area
     looks = ((look, area) for look, area in areas.items() if area > ROUNDING_MM**2)
     return tuple(SectionColumn(0.0, area, _layers([first[kind] for kind in look])) for look, area in looks)
 
 
 def _plan(body: Body, piece: Piece) -> shapely.Polygon:
     """An upright prism seen from above."""
+    if not piece.is_constant("z"):
+        raise ValueError(f"{body.name} is slanted or curved in elevation: no column has constant layers")
     plan = shapely.Polygon(seen_from_above(piece))
     if not plan.is_valid:
         raise ValueError(f"an outline of {body.name} crosses itself: {shapely.is_valid_reason(plan)} mm")

@@ -306,7 +306,7 @@ def surface(piece: Piece) -> Polyhedron:
 @lru_cache(maxsize=64)
 def _of_loft(loft: Loft) -> Polyhedron:
     n, numbers = len(loft.lower), dict[Place, int]()
-    ends = [(o, z) for o, z in ((loft.lower, loft.bottom_mm), (loft.upper, loft.top_mm))]
+    ends = (loft.lower, loft.bottom_mm), (loft.upper, loft.top_mm)
     ring = [numbers.setdefault((x, y, z), len(numbers)) for o, z in ends for x, y in o]
     triangles = []
     for k in range(n):
@@ -315,8 +315,8 @@ def _of_loft(loft: Loft) -> Polyhedron:
         triangles += [(a, b, c), (a, c, d)]
     for (outline, _), first in zip(ends, (0, n), strict=True):
         if abs(area_mm2(outline)) > SLIVER_MM**2:
-            cap = [tuple(ring[first + k] for k in triangle) for triangle in triangulated(outline)]
-            triangles += [(c, b, a) for a, b, c in cap] if first == 0 else [(a, b, c) for a, b, c in cap]
+            cap = [(ring[first + a], ring[first + b], ring[first + c]) for a, b, c in triangulated(outline)]
+            triangles += cap if first else [(c, b, a) for a, b, c in cap]
     return Polyhedron(tuple(numbers), tuple(t for t in triangles if len(set(t)) == 3))
 
 

@@ -71,17 +71,11 @@ def repeat(regions: Sequence[Region], size_mm: Sequence[float], axis: int) -> Re
     looks = [region for region in dict.fromkeys(regions) if not _is_plain(region, size_mm, axis)]
     if not looks:
         return Repeat.of(0.0, whole, False, whole)
-    lines = _crossings(looks, axis, whole, wide)
-    at, kind = max(lines, key=lambda line: len(line[0]))
-    if not len(at):  # a piece that lies between the lines
+    lines = sorted(_crossings(looks, axis, whole, wide), key=lambda line: -len(line[0]))
+    period = _period(looks, lines, size_mm, axis)
+    if not period:
         return Repeat.of(0.0, whole, False, whole)
-    firsts = [at[kind == k] for k in np.unique(kind)]
-    steps = np.unique(np.concatenate([own[1:] - own[0] for own in firsts]).round(9))
-    for period in steps[(steps > _SAME_MM) & (steps < whole / 2 + _SAME_MM)].tolist():
-        if all(_shifts(own, k, period, whole) for own, k in lines) and _is_shifted(looks, axis, period, size_mm):
-            break
-    else:
-        return Repeat.of(0.0, whole, False, whole)
+    at, kind = lines[0]
     near = at < at[0] + period + _SAME_MM
     mirrors = np.unique((((at[near][:, None] + at[near]) / 2)[kind[near][:, None] != kind[near]]).round(9))
     for mirror in mirrors.tolist():
@@ -92,6 +86,19 @@ def repeat(regions: Sequence[Region], size_mm: Sequence[float], axis: int) -> Re
     gaps = np.diff(np.append(corners, corners[0] + period))
     low = float((corners[gaps.argmax()] + gaps.max() / 2) % period)
     return Repeat.of(low, low + period, True, whole)
+
+
+def _period(looks: Sequence[Region], lines: Sequence[tuple[Real, Real]], size_mm: Sequence[float], axis: int) -> float:
+    """Least shift that continues regions, of those by which the first line's crossings repeat; 0 for none [mm]."""
+    whole, (at, kind) = size_mm[axis], lines[0]
+    if not len(at):  # a piece that lies between the lines
+        return 0.0
+    firsts = [at[kind == k] for k in np.unique(kind)]
+    steps = np.unique(np.concatenate([own[1:] - own[0] for own in firsts]).round(9))
+    for period in steps[(steps > _SAME_MM) & (steps < whole / 2 + _SAME_MM)].tolist():
+        if all(_shifts(own, k, period, whole) for own, k in lines) and _is_shifted(looks, axis, period, size_mm):
+            return float(period)
+    return 0.0
 
 
 def widened(regions: Sequence[Region], size_mm: Sequence[float], axis: int, by_mm: float) -> Repeat:
@@ -227,7 +234,7 @@ def raster(
     ValueError
         A piece is no box, or bodies overlap.
     """
-    pieces = [(body, p) for body in scene.bodies for p in body.pieces]
+    pieces = scene.pieces
     if not all(p.is_box() for _, p in pieces):
         raise ValueError("not all of it is boxes")
     planes = [_planes([p for _, p in pieces], *each) for each in zip("xyz", outer_mm, strict=True)]

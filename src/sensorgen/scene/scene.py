@@ -238,6 +238,11 @@ class Scene:
         """Leave out empty bodies."""
         object.__setattr__(self, "bodies", tuple(b for b in self.bodies if b.pieces))
 
+    @property
+    def pieces(self) -> list[tuple[Body, Piece]]:
+        """Each piece with the body that it is of."""
+        return [(body, piece) for body in self.bodies for piece in body.pieces]
+
     def body(self, name: str) -> Body:
         """The body of that name; raises KeyError where there is none."""
         return next(b for b in self.bodies if b.name == name)
@@ -255,6 +260,11 @@ class Scene:
     def _moved(self, move: Move) -> "Scene":
         bodies = (replace(b, pieces=tuple(p.moved(move) for p in b.pieces)) for b in self.bodies)
         return replace(self, bodies=tuple(bodies))
+
+
+def dielectrics(bodies: Iterable[Body]) -> tuple[str, ...]:
+    """Materials of bodies of no terminal, air last."""
+    return (*sorted({body.material for body in bodies if not body.terminal} - {"air"}), "air")
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,10 @@
 """Cross-sections of a scene, and the vertical columns that they are made of."""
 
 from bisect import bisect_left
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
+from itertools import chain, pairwise
 
 from sensorgen.scene.scene import Body, Outline, Point, Scene, shadow, sides
 
@@ -59,8 +60,14 @@ def square_to(scene: Scene, normal: str) -> list[Section]:
     return _sections(scene, normal) if _is_constant(scene, normal) else []
 
 
+def distinct(values: Iterable[float], near: float) -> list[float]:
+    """Values in order, without those that are no more than ``near`` above the one before."""
+    rising = sorted(values)
+    return rising[:1] + [value for before, value in pairwise(rising) if value - before > near]
+
+
 def _is_constant(scene: Scene, normal: str) -> bool:
-    return all(p.is_constant(normal) for b in scene.bodies for p in b.pieces)
+    return all(p.is_constant(normal) for _, p in scene.pieces)
 
 
 def _through(cuts: list[float], spans: list[tuple[float, float]]) -> list[list[int]]:
@@ -74,18 +81,18 @@ def _through(cuts: list[float], spans: list[tuple[float, float]]) -> list[list[i
 
 def _sections(scene: Scene, normal: str) -> list[Section]:
     across = "x" if normal == "y" else "y"
-    spans = [(p.span(normal), body, p) for body in scene.bodies for p in body.pieces]
-    cuts = sorted({edge for span, _, _ in spans for edge in span})
-    slabs = _through(cuts, [span for span, _, _ in spans])
+    pieces = scene.pieces
+    spans = [p.span(normal) for _, p in pieces]
+    cuts = sorted(set(chain.from_iterable(spans)))
     looks: dict[object, int] = {}
-    look = [looks.setdefault((body.name, shadow(p, normal)), len(looks)) for _, body, p in spans]
+    look = [looks.setdefault((body.name, shadow(p, normal)), len(looks)) for body, p in pieces]
     by_look: dict[tuple[int, ...], tuple[float, float, list[int]]] = {}
-    for (low, high), here in zip(pairwise(cuts), slabs, strict=True):
+    for (low, high), here in zip(pairwise(cuts), _through(cuts, spans), strict=True):
         key = tuple(look[i] for i in here)
         depth, at, members = by_look.get(key, (0.0, (low + high) / 2, here))
         by_look[key] = (depth + high - low, at, members)
     return [
-        Section(across, depth, at, tuple((spans[i][1], o) for i in members for o in spans[i][2].cut(normal, at)))
+        Section(across, depth, at, tuple((pieces[i][0], o) for i in members for o in pieces[i][1].cut(normal, at)))
         for depth, at, members in by_look.values()
     ]
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from sensorgen.scene.scene import SLIVER_MM, Body, Piece, Prism, Scene, area_mm2, between, seen_from_above, shadow
+from sensorgen.scene.sections import distinct
 
 if TYPE_CHECKING:  # a stored answer loads no numbers
     import shapely
@@ -43,26 +44,14 @@ def slabs(scene: Scene, cuts: int = CUTS) -> tuple[Slab, ...]:
 
     Curved faces are those of the bodies' meshes, chords within 0.01 mm.
     """
-    import numpy as np
     import shapely
 
-    upright, slanted = list[tuple[Body, Piece]](), list[tuple[Body, Piece]]()
-    for body, piece in ((b, p) for b in scene.bodies for p in b.pieces):
-        (upright if piece.is_constant("z") else slanted).append((body, piece))
-    heights = [z for _, p in upright for z in p.span("z")]
-    for _, piece in slanted:
-        heights += [*np.linspace(*piece.span("z"), cuts + 1).tolist(), *piece.levels_mm()]
-    levels = np.unique(np.array(heights).round(9))
-    levels = levels[np.append(True, np.diff(levels) > SLIVER_MM)]
-    faces = [_faces(piece) for _, piece in slanted]
+    pieces = sorted(scene.pieces, key=lambda own: not own[1].is_constant("z"))  # upright ones first
+    faces = [None if piece.is_constant("z") else _faces(piece) for _, piece in pieces]
     cut_slabs = []
-    for low, high in pairwise(levels.tolist()):
+    for low, high in pairwise(_levels(scene, cuts)):
         inner, outer = defaultdict[Body, "list[Region]"](list), defaultdict[Body, "list[Region]"](list)
-        for body, piece in upright:
-            if piece.span("z")[0] < (low + high) / 2 < piece.span("z")[1]:
-                inner[body].append(shapely.Polygon(seen_from_above(piece)))
-                outer[body].append(inner[body][-1])
-        for (body, piece), triangles in zip(slanted, faces, strict=True):
+        for (body, piece), triangles in zip(pieces, faces, strict=True):
             if piece.span("z")[0] < (low + high) / 2 < piece.span("z")[1]:
                 least, most = _between(piece, triangles, low, high)
                 inner[body].append(least)
@@ -70,6 +59,17 @@ def slabs(scene: Scene, cuts: int = CUTS) -> tuple[Slab, ...]:
         united = [{b: shapely.union_all(own) for b, own in some.items()} for some in (inner, outer)]
         cut_slabs.append(Slab(low, high, united[0], united[1]))
     return tuple(cut_slabs)
+
+
+def _levels(scene: Scene, cuts: int) -> list[float]:
+    """Heights at which upright pieces begin and end, and others are cut [mm]."""
+    import numpy as np
+
+    heights: list[float] = []
+    for _, piece in scene.pieces:
+        upright = piece.is_constant("z")
+        heights += piece.span("z") if upright else (*np.linspace(*piece.span("z"), cuts + 1), *piece.levels_mm())
+    return distinct(np.array(heights).round(9).tolist(), SLIVER_MM)
 
 
 def covered(scene: Scene, terminal: str) -> bool:
@@ -97,12 +97,15 @@ def _faces(piece: Piece) -> "Real":
     return mesh(Body("", "", (piece,))).corners_mm()
 
 
-def _between(piece: Piece, faces: "Real", low_mm: float, high_mm: float) -> "tuple[Region, Region]":
-    """Regions that a piece covers at all heights between two, and at any: its surface decides where they differ."""
+def _between(piece: Piece, faces: "Real | None", low_mm: float, high_mm: float) -> "tuple[Region, Region]":
+    """Regions that a piece covers at all heights between two, and at any: where they differ, its faces decide."""
     import shapely
 
     from sensorgen.scene.layers import EMPTY
 
+    if faces is None:  # upright
+        plan = shapely.Polygon(seen_from_above(piece))
+        return plan, plan
     ends = [
         shapely.union_all([shapely.Polygon(outline) for outline in piece.cut("z", at)])
         for at in (low_mm + SLIVER_MM, high_mm - SLIVER_MM)

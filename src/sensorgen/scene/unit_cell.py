@@ -9,13 +9,13 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import floor
 
 import numpy as np
 
 from sensorgen.scene.scene import Point
-from sensorgen.scene.sections import ROUNDING_MM, Section, SectionColumn, columns
+from sensorgen.scene.sections import ROUNDING_MM, Section, SectionColumn, columns, distinct
 
 LARGER = 2  # slices of a cell that the sensor's end does not cut, over those of one that it cuts
 _MOST_PLACES = 400  # for the first two mirrors; a pattern of more corners than these is solved as a whole
@@ -293,11 +293,9 @@ def _cell(slices: list[Slice], low: float, high: float) -> SectionCell:
     """The piece between two places, cut where a sensor's end falls into it, and how often each part occurs."""
     pieces = [(p.left_mm, p.right_mm) for p in _folded(slices, low, high)]
     inside = cut(slices, low, high)
-    ends = sorted({x for piece in pieces for x in piece} | {x for s in inside for x in (s.left_mm, s.right_mm)})
-    distinct = [x for k, x in enumerate(ends) if k == 0 or x - ends[k - 1] > 10 * ROUNDING_MM]
-    parts = [p for a, b in pairwise(distinct) for p in cut(inside, a, b)]
-    middles = [(p.left_mm + p.right_mm) / 2 for p in parts]
-    shares = [float(sum(a < m < b for a, b in pieces)) for m in middles]
+    ends = chain.from_iterable([*pieces, *((s.left_mm, s.right_mm) for s in inside)])
+    parts = [p for a, b in pairwise(distinct(ends, 10 * ROUNDING_MM)) for p in cut(inside, a, b)]
+    shares = [float(sum(a < (p.left_mm + p.right_mm) / 2 < b for a, b in pieces)) for p in parts]
     if max(shares) == min(shares):
         return SectionCell(tuple(inside), (shares[0],) * len(inside))
     return SectionCell(tuple(parts), tuple(shares))

@@ -305,13 +305,13 @@ def export_design(design: Design, path: str | Path, gcode: str | Path | None = N
     ['plate.3mf']
     """
     from sensorgen.asprinted import printed as asprinted
-    from sensorgen.export.gcode import paths
+    from sensorgen.export.gcode import motion
     from sensorgen.workflows import export as exports
 
     design = _named(design)
     content = None if gcode is None else Path(gcode).read_bytes()
     printed = (
-        asprinted.body(design, paths.read(content, design.machine)) if content else reviewed(design).printed(design)
+        asprinted.body(design, motion.read(content, design.machine)) if content else reviewed(design).printed(design)
     )
     return exports.export(printed, Path(path))
 

@@ -20,7 +20,7 @@ from sensorgen.core.findings import Finding, headline, listed, most_severe
 from sensorgen.core.version import __version__
 from sensorgen.design import printer
 from sensorgen.design.design import Design
-from sensorgen.design.tower import tower
+from sensorgen.design.printer import tower
 from sensorgen.export import threemf
 from sensorgen.export.slicers import cura, orca, prusa
 from sensorgen.export.slicers.loads import loads

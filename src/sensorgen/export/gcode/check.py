@@ -10,9 +10,8 @@ from sensorgen.core.errors import MissingValue, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import commands, limits
-from sensorgen.export.gcode.motion import executed
+from sensorgen.export.gcode.motion import NOT_MODEL, executed
 from sensorgen.export.gcode.moves import NO_TOOL, Motion, seconds
-from sensorgen.export.gcode.paths import NOT_MODEL
 from sensorgen.export.gcode.reading import Source
 from sensorgen.export.gcode.results import Checked, FileNeeds, ToolMaterial, merged
 

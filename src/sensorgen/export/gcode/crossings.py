@@ -13,8 +13,8 @@ import shapely
 
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.design.printer import Printer
+from sensorgen.export.gcode.motion import Numbering, paths_of, tools_of
 from sensorgen.export.gcode.moves import Motion
-from sensorgen.export.gcode.paths import Numbering, paths_of, tools_of
 from sensorgen.export.gcode.results import FACE_MM, NEAR_MM
 
 CONTACT_MM = 0.03  # a nozzle within this above a line touches it: less than the thinnest layer

@@ -16,9 +16,8 @@ from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode.crossings import CONTACT_MM, Crossings, crossings
-from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.motion import Numbering, follow
 from sensorgen.export.gcode.moves import Motion, seconds
-from sensorgen.export.gcode.paths import Numbering
 from sensorgen.export.gcode.reading import Source, text_of
 from sensorgen.export.gcode.results import COUNTED_MM, LIFT_MM, Drags, Lifting, OfLayer, ToolTravel
 
@@ -223,8 +222,7 @@ class _Lifts:
         high = min(max(heights.max(), top[first : last + 1].max()) + LIFT_MM, self.machine.reach_mm().z[1])
         z_feed, feed = 60 * self.machine.max_speed_mm_s.z, self.motion.feed_mm_min
         length, speed = self.habits.get(self.tools[first], (0.0, 0.0))
-        draws = bool(length and not self.retracted[first] and self.relative_e[first])
-        draws &= bool(self.over_mm[first : last + 1].sum() > _DRAWN_MM)
+        draws = self._draws(first, last)
         up = [f"G1 E-{_short(length)} F{_short(speed)}"] if draws else []
         up.append(f"G1 Z{_short(high)} F{_short(z_feed)}")
         if not self._has_feed(numbers[0]):
@@ -238,6 +236,12 @@ class _Lifts:
             self.lines[number - 1] = _Z.sub(b"", code) + semicolon + remark
         before[numbers[0]], after[numbers[-1]] = up, down
         self.lifts, self.retractions = self.lifts + 1, self.retractions + draws
+
+    def _draws(self, first: int, last: int) -> bool:
+        """Test whether filament is to be drawn back for some moves, and the file does not do so."""
+        length, _ = self.habits.get(self.tools[first], (0.0, 0.0))
+        far = self.over_mm[first : last + 1].sum() > _DRAWN_MM
+        return bool(far and length and not self.retracted[first] and self.relative_e[first])
 
     def _has_feed(self, number: int) -> bool:
         return b"F" in self.lines[number - 1].partition(b";")[0].upper()

@@ -9,8 +9,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache, partial
 from typing import TYPE_CHECKING
 
-from sensorgen.design.printer import Printer, Quality
-from sensorgen.design.tower import PRIME_MM3, tower
+from sensorgen.design.printer import PRIME_MM3, Printer, Quality, tower
 from sensorgen.export.slicers.loads import Recipe, ToolLoad, line_area_mm2, number, recipes, templates
 
 if TYPE_CHECKING:

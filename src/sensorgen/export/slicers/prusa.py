@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import SlicerFailed
-from sensorgen.design.printer import Printer, Quality
-from sensorgen.design.tower import PRIME_MM3, tower
+from sensorgen.design.printer import PRIME_MM3, Printer, Quality, tower
 from sensorgen.export.slicers import PROGRAMS
 from sensorgen.export.slicers.loads import (
     Recipe,

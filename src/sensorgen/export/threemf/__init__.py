@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sensorgen.core.errors import BadInput, UnknownName
-from sensorgen.design.tower import Tower
+from sensorgen.design.printer import Tower
 from sensorgen.export.threemf import core, cura, orca, prusa
 from sensorgen.export.threemf.core import Part, box_mm, check, placed
 

@@ -23,7 +23,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.design.tower import Tower
+from sensorgen.design.printer import Tower
 from sensorgen.export.threemf import core
 from sensorgen.export.threemf.core import Part, escaped
 

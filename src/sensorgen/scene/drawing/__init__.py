@@ -17,6 +17,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
+from itertools import chain
 from math import cos, hypot, pi, sin
 
 from sensorgen.core.findings import Finding, counted, counts, grouped
@@ -329,26 +330,20 @@ def svg(
     letters, marked = panels.letters(scene.bodies), ranked(findings)
     entries = placed(marked, letters, (LEFT + 2, FOOT + 8.5, SPLIT - 3, BOTTOM - 2))
     shown = [entry.mark for entry in entries]
-    gaps = [(measured, panel) for panel in details if (measured := nearest(panel.view))]
-    gap = min(gaps, key=lambda pair: round(pair[0].value_mm, 6), default=None)
-    taken: list[Point] = [place for panel in details for place in panels.letter_places(panel).values()]
+    gap = _nearest(details)
+    taken = list[Point](chain.from_iterable(panels.letter_places(panel).values() for panel in details))
     left, room = SPLIT + 3, RIGHT - SPLIT - 3
     rows = title_rows(scene, details[0].frame, grid, gap[0] if gap else None, notes)
-    marks = []
+    mark = ""
     if gap and gap[0].near[0] <= gap[1].view.end_mm:  # in the view that shows it smallest
         mark, space = panels.gap(gap[1], gap[0])
         taken += space
-        marks.append(mark)
     parts = [
         *_sections(scene, details, lanes, grid, materials),
         *(part for panel in details if printed for part in panels.outlined(panel, printed)),
-        *marks,
+        mark,
         *on_detail(shown, details, grid, taken),
-        *(
-            p
-            for d, w, n in zip(details, wholes, NAMES, strict=False)
-            for p in panels.draw_whole(d, w, n, scene, materials)
-        ),
+        *_overview(scene, details, wholes, materials),
         *on_overview(shown, details, wholes),
         *listed(entries, marked, LEFT + 2, FOOT + 3.5, SPLIT - LEFT - 5),
         line("frame", 6, FOOT - 2, WIDTH - 6, FOOT - 2) + line("frame", SPLIT, FOOT - 2, SPLIT, HEIGHT - 6),
@@ -368,6 +363,20 @@ def _details(scene: Scene, grid: Sequence[float]) -> tuple[Lanes, list[ViewPanel
     top = DETAIL + 7 + panels.ROW * above
     bottom = OVERVIEW - 5 - panels.ROW * below
     return lanes, panels.arrange(seen, max(grid[-1], height), height, (left, top, RIGHT - paper.WIDTH, bottom))
+
+
+def _nearest(details: Sequence[ViewPanel]) -> tuple[Gap, ViewPanel] | None:
+    """Smallest gap of two terminals in any view, and the view that shows it."""
+    gaps = [(measured, panel) for panel in details if (measured := nearest(panel.view))]
+    return min(gaps, key=lambda pair: round(pair[0].value_mm, 6), default=None)
+
+
+def _overview(
+    scene: Scene, details: Sequence[ViewPanel], wholes: Sequence[ViewPanel], colours: Colours
+) -> Iterator[str]:
+    """The whole length of each section."""
+    for detail, whole, name in zip(details, wholes, NAMES, strict=False):
+        yield from panels.draw_whole(detail, whole, name, scene, colours)
 
 
 def _sections(

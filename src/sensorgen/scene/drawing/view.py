@@ -10,7 +10,7 @@ from itertools import chain, pairwise, permutations
 from math import hypot
 
 from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Point, Scene, area_mm2, clipped, sides
-from sensorgen.scene.sections import Section, SectionColumn, alike, columns
+from sensorgen.scene.sections import Section, SectionColumn, alike, columns, distinct
 
 PLACES = 8  # places tried for a section: two periods of crossed strips change eight times
 PROBE = 64  # corners looked at for a period: enough for two repetitions of any pattern one would draw
@@ -78,18 +78,22 @@ def views(scene: Scene) -> list[View]:
     return [view for view in both if len(view.columns) > 1] or both[:1]
 
 
+def _stretches(scene: Scene, normal: str) -> list[Point]:
+    """Stretches along an axis in which the sensor keeps one look; those near its middle first where it never does."""
+    edges = sorted({edge for _, p in scene.pieces for edge in p.span(normal)})
+    stretches = [(low, high) for low, high in pairwise(edges) if high - low > SLIVER_MM]
+    if not all(p.is_constant(normal) for _, p in scene.pieces):
+        middle = scene.size_mm[AXES.index(normal)] / 2
+        stretches.sort(key=lambda ends: abs(sum(ends) / 2 - middle))
+    return stretches
+
+
 def _view(scene: Scene, across: str) -> View:
     """The section in which most of the terminals is seen: through the conductor strips, not beside them."""
     normal = "y" if across == "x" else "x"
-    spans = [(p.span(normal), body, p) for body in scene.bodies for p in body.pieces]
-    edges = sorted({edge for span, _, _ in spans for edge in span})
-    # Through the first stretches in which the sensor keeps one look.
-    stretches = [(low, high) for low, high in pairwise(edges) if high - low > SLIVER_MM]
-    if not all(p.is_constant(normal) for _, _, p in spans):  # nor does any other stretch: through its middle
-        middle = scene.size_mm[AXES.index(normal)] / 2
-        stretches.sort(key=lambda ends: abs(sum(ends) / 2 - middle))
+    spans = [(p.span(normal), body, p) for body, p in scene.pieces]
     cuts = []
-    for low, high in stretches[:PLACES]:
+    for low, high in _stretches(scene, normal)[:PLACES]:
         at = (low + high) / 2
         cut = ((body, o) for (start, end), body, p in spans if start < at < end for o in p.cut(normal, at))
         cuts.append(Section(across, high - low, at, tuple(cut)))
@@ -157,9 +161,9 @@ class Gap:
 def heights(views: Sequence[View], height_mm: float) -> list[list[Measure]]:
     """Vertical measures in lanes from the sensor outwards: level by level, whole bodies, the whole."""
     spans = [span for view in views for span in _extents(view)]
-    levels = _distinct([0.0, height_mm, *(z for view in views for z in _levels(view))])
+    levels = distinct([0.0, height_mm, *(z for view in views for z in _levels(view))], SAME_MM)
     if len(levels) > MOST_LEVELS:
-        levels = _distinct([0.0, height_mm, *chain.from_iterable(spans)])
+        levels = distinct([0.0, height_mm, *chain.from_iterable(spans)], SAME_MM)
     steps = [Measure(low, high) for low, high in pairwise(levels[:MOST_LEVELS])]
     whole = Measure(0.0, height_mm)
     bodies = _new((Measure(*span) for span in spans), [*steps, whole])
@@ -264,14 +268,6 @@ def _new(measures: Iterable[Measure], known: Sequence[Measure], by_value: bool =
         if not any(abs(m.value_mm - k.value_mm) < SAME_MM if by_value else m.same(k) for k in [*known, *new]):
             new.append(m)
     return new
-
-
-def _distinct(values: Iterable[float]) -> list[float]:
-    distinct: list[float] = []
-    for value in sorted(values):
-        if not distinct or value - distinct[-1] > SAME_MM:
-            distinct.append(value)
-    return distinct
 
 
 def _foot(p: Point, a: Point, b: Point) -> Point:

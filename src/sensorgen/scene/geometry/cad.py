@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import CadFailed, SensorgenError
-from sensorgen.core.worker import Worker, WorkerEnded
+from sensorgen.core.process import Worker, WorkerEnded
 from sensorgen.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class CadProcess:
         self.submit(scene, colours, title, path).result()
 
     def read_step(self, path: Path, chord_mm: float) -> "list[FileBody]":
-        """Have a STEP file read and wait for it; as of :func:`sensorgen.scene.geometry.step_files.read_step`."""
+        """Have a STEP file read and wait for it; as of :func:`sensorgen.scene.geometry.solids.read_step`."""
         return list(self._thread.submit(self._exchange, "read_step", path.absolute(), chord_mm).result())
 
     def _exchange(self, name: str, *arguments: Any) -> Any:

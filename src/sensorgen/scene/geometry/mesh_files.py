@@ -27,7 +27,7 @@ UNITS_MM = {"micron": 1e-3, "mm": 1.0, "cm": 10.0, "inch": 25.4, "foot": 304.8, 
 MOST_BYTES = 100_000_000  # of a file
 MOST_UNPACKED = 400_000_000  # of the model files in a 3MF
 MOST_TRIANGLES = 500_000
-_3MF_UNITS = {"millimeter": "mm", "centimeter": "cm", "meter": "m"}  # others as in UNITS_MM
+_3MF_UNITS = {"": "mm", "millimeter": "mm", "centimeter": "cm", "meter": "m"}  # others as in UNITS_MM
 _DEPTH = 20  # of components within components
 _Range = tuple[int, int, str]  # first and last triangle of a part, and its name
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -101,25 +101,7 @@ def read_stl(path: Path, unit: str) -> list[FileBody]:
     scale = _scale(unit)
     with reading(path):
         data = path.read_bytes()
-    count = struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else -1
-    if len(data) == 84 + 50 * count:
-        rows = np.frombuffer(data, np.dtype([("face", "<f4", (4, 3)), ("more", "<u2")]), count, 84)
-        singles = rows["face"][:, 1:].reshape(-1, 3)
-        solids = [(path.stem, _shortest(singles))]
-    elif data.lstrip()[:5].lower() == b"solid":
-        texts = re.split(rb"(?m)^\s*solid\b[ \t]*([^\r\n]*)", data)[1:]
-        solids = [
-            (
-                name.decode("utf-8", "replace").strip() or path.stem,
-                np.array(_VERTEX.findall(text), float).reshape(-1, 3),
-            )
-            for name, text in zip(texts[::2], texts[1::2], strict=True)
-        ]
-    else:
-        raise BadInput(
-            f"{path}: no STL: {len(data)} bytes do not fit the {count} triangles of its head; export it again"
-        )
-    solids = [(name, points) for name, points in solids if len(points)]
+    solids = [(name or path.stem, points) for name, points in _stl_solids(data, path) if len(points)]
     if not solids or any(len(points) % 3 for _, points in solids):
         raise BadInput(f"{path}: an STL without whole triangles; expected a closed surface")
     _refuse_many(path, sum(len(points) // 3 for _, points in solids))
@@ -128,6 +110,22 @@ def read_stl(path: Path, unit: str) -> list[FileBody]:
         FileBody(name, points * scale, np.arange(len(points)).reshape(-1, 3), rounding_mm=rounding)
         for name, points in solids
     ]
+
+
+def _stl_solids(data: bytes, path: Path) -> Iterator[tuple[str, Real]]:
+    """Name of each solid, and the corners of its triangles (3n, 3)."""
+    count = struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else -1
+    if len(data) == 84 + 50 * count:
+        rows = np.frombuffer(data, np.dtype([("face", "<f4", (4, 3)), ("more", "<u2")]), count, 84)
+        yield "", _shortest(rows["face"][:, 1:].reshape(-1, 3))
+    elif data.lstrip()[:5].lower() == b"solid":
+        texts = re.split(rb"(?m)^\s*solid\b[ \t]*([^\r\n]*)", data)[1:]
+        for name, text in zip(texts[::2], texts[1::2], strict=True):
+            yield name.decode("utf-8", "replace").strip(), np.array(_VERTEX.findall(text), float).reshape(-1, 3)
+    else:
+        raise BadInput(
+            f"{path}: no STL: {len(data)} bytes do not fit the {count} triangles of its head; export it again"
+        )
 
 
 def _shortest(singles: np.ndarray) -> Real:
@@ -190,17 +188,8 @@ def read_3mf(path: Path, unit: str = "") -> list[FileBody]:
     check_size(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            names = [name for name in archive.namelist() if name.endswith(".model")]
-            size = sum(archive.getinfo(name).file_size for name in names)
-            if size > MOST_UNPACKED:
-                raise BadInput(f"{path}: unpacks to {size / 1e6:.0f} MB; expected at most {MOST_UNPACKED / 1e6:.0f} MB")
-            model = _Model()
-            for name in names:
-                _parse(archive, name, _model_handler(model, "/" + name))
-            parts = _parts(archive)
-        if not model.built:
-            raise BadInput("it builds nothing; expected objects in its <build>")
-        scale = _scale(unit or _3MF_UNITS.get(model.unit, model.unit or "mm"))
+            model, parts = _model(archive, path), _parts(archive)
+        scale = _scale(unit or _3MF_UNITS.get(model.unit, model.unit))
         bodies = [body for key, where in model.built for body in _bodies(model, key, where, parts)]
         _refuse_many(path, sum(len(body.triangles) for body in bodies))
         return [
@@ -213,6 +202,20 @@ def read_3mf(path: Path, unit: str = "") -> list[FileBody]:
     except (zipfile.BadZipFile, expat.ExpatError, KeyError, ValueError, IndexError, OverflowError, EOFError,
             NotImplementedError, RuntimeError, OSError) as error:  # fmt: skip
         raise BadInput(f"{path}: not a 3MF: {error or type(error).__name__}; export it again") from None
+
+
+def _model(archive: zipfile.ZipFile, path: Path) -> _Model:
+    """Contents of all model files of a 3MF; raises BadInput where they are too large, or build nothing."""
+    names = [name for name in archive.namelist() if name.endswith(".model")]
+    size = sum(archive.getinfo(name).file_size for name in names)
+    if size > MOST_UNPACKED:
+        raise BadInput(f"{path}: unpacks to {size / 1e6:.0f} MB; expected at most {MOST_UNPACKED / 1e6:.0f} MB")
+    model = _Model()
+    for name in names:
+        _parse(archive, name, _model_handler(model, "/" + name))
+    if not model.built:
+        raise BadInput("it builds nothing; expected objects in its <build>")
+    return model
 
 
 def _parse(archive: zipfile.ZipFile, name: str, start: Callable[[str, Mapping[str, str]], None]) -> None:
@@ -290,9 +293,8 @@ def _bodies(
     if one.kind not in ("model", "other"):
         return
     for part, place in one.components:
-        linear = place[:3] @ where[:3]
-        shift = place[3] @ where[:3] + where[3]
-        yield from _bodies(model, part, np.vstack([linear, shift]), parts, depth + 1)
+        moved = np.vstack([place[:3] @ where[:3], place[3] @ where[:3] + where[3]])
+        yield from _bodies(model, part, moved, parts, depth + 1)
     if not one.triangles:
         return
     points = np.array(one.vertices, float).reshape(-1, 3) @ where[:3] + where[3]

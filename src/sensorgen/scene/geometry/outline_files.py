@@ -60,12 +60,10 @@ def read(path: Path) -> shapely.Polygon:
     return shapely.Polygon(moved.exterior, moved.interiors)
 
 
-def _region(lines: list[Real]) -> shapely.Polygon:
-    """The region in closed lines, from pieces of curves."""
+def _rings(lines: list[Real]) -> list[shapely.Polygon]:
+    """Closed curves from pieces of curves whose ends meet, the largest first; raises BadInput where one is open."""
     from scipy.spatial import cKDTree
 
-    if not lines:
-        raise BadInput("no outline in it; expected one closed curve")
     ends = np.array([line[k] for line in lines for k in (0, -1)])
     label = groups(len(ends), *cKDTree(ends).query_pairs(JOINED_MM, output_type="ndarray").T)
     _, first = np.unique(label, return_index=True)
@@ -79,7 +77,14 @@ def _region(lines: list[Real]) -> shapely.Polygon:
             raise BadInput(
                 f"the outline is open: a curve ends at ({xa:.6g}, {ya:.6g}) and ({xb:.6g}, {yb:.6g}) mm; close it"
             )
-    rings = sorted((shapely.Polygon(line) for line in merged), key=lambda ring: -abs(ring.area))
+    return sorted((shapely.Polygon(line) for line in merged), key=lambda ring: -abs(ring.area))
+
+
+def _region(lines: list[Real]) -> shapely.Polygon:
+    """The region in closed lines, from pieces of curves."""
+    if not lines:
+        raise BadInput("no outline in it; expected one closed curve")
+    rings = _rings(lines)
     for ring in rings:
         if not ring.is_valid:
             raise BadInput(f"the outline crosses itself: {shapely.is_valid_reason(ring)} mm; draw it anew there")

@@ -56,7 +56,7 @@ def bricks_of(scene: Scene) -> Bricks:
     BadInput
         A piece is no box, or bodies overlap.
     """
-    pieces = [(body, p) for body in scene.bodies for p in body.pieces]
+    pieces = scene.pieces
     if not all(p.is_box() for _, p in pieces):
         raise BadInput("pressing in 3D needs a scene of boxes: not all of its bodies are")
     regions = [Region(AIR, ""), *dict.fromkeys(Region(body.material, body.terminal) for body, _ in pieces)]

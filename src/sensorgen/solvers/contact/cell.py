@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import dist
+from typing import TypeVar
 
 import shapely
 
@@ -19,6 +20,7 @@ _DIGITS = 9  # of a coordinate [mm]: places nearer than a picometre are one
 _SLIVER_MM = 1e-9
 
 Edge = tuple[Point, Point]
+End = TypeVar("End", Point, int)  # an end of an edge, or its node's number
 
 
 @dataclass(frozen=True)
@@ -119,12 +121,11 @@ def between(whole: Sequence[Slice], left: float, right: float, *, mirrored: bool
     edges: dict[Edge, tuple[int, int]] = {}
     for a, b, layers in strips:
         for region, low, high in layers:
-            _add(edges, (a, low[0]), (b, low[1]), (number[region], OUTSIDE))
-            _add(edges, (a, high[0]), (b, high[1]), (OUTSIDE, number[region]))
+            add(edges, _rounded((a, low[0])), _rounded((b, low[1])), (number[region], OUTSIDE))
+            add(edges, _rounded((a, high[0])), _rounded((b, high[1])), (OUTSIDE, number[region]))
     for before, after in pairwise([None, *strips, None]):
         _uprights(edges, before, after, number)
-    kept = {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
-    return ContactCell(kept, tuple(regions), left, right, mirrored)
+    return ContactCell(borders(edges), tuple(regions), left, right, mirrored)
 
 
 def _layers(strip: Slice) -> list[tuple[Region, Point, Point]]:
@@ -145,11 +146,9 @@ def partition(bodies: Mapping[Region, shapely.Geometry], whole: shapely.Polygon,
         number = 1 + next(k for k, region in enumerate(filled.values()) if region.contains(inside))
         for ring in (shapely.orient_polygons(face).exterior, *face.interiors):
             for a, b in pairwise(_rounded(place) for place in ring.coords):
-                if a != b:
-                    _add(edges, *((a, b, (number, OUTSIDE)) if a < b else (b, a, (OUTSIDE, number))))
+                add(edges, a, b, (number, OUTSIDE))
     left, _, right, _ = (round(v, _DIGITS) for v in whole.bounds)
-    kept = {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
-    return ContactCell(kept, regions, left, right, mirrored=True, turned=turned)
+    return ContactCell(borders(edges), regions, left, right, mirrored=True, turned=turned)
 
 
 def joined(edges: Mapping[Edge, tuple[int, int]]) -> dict[Edge, tuple[int, int]]:
@@ -176,11 +175,21 @@ def _in_line(first: Edge, second: Edge) -> bool:
     return b == c and abs((b[0] - a[0]) * (d[1] - c[1]) - (b[1] - a[1]) * (d[0] - c[0])) <= _SLIVER_MM * dist(a, d)
 
 
-def _add(edges: dict[Edge, tuple[int, int]], a: Point, b: Point, sides: tuple[int, int]) -> None:
-    """Add an edge from left to right, or upwards; the region on its other side, if any, is kept."""
-    key = (_rounded(a), _rounded(b))
-    known = edges.get(key, (OUTSIDE, OUTSIDE))
-    edges[key] = (sides[0] or known[0], sides[1] or known[1])
+def add(
+    edges: dict[tuple[End, End], tuple[int, int]], a: End, b: End, sides: tuple[int, int],
+    empty: int = OUTSIDE,
+) -> None:  # fmt: skip
+    """Add an edge of some length, from its lesser end on; a side that is ``empty`` keeps the region that it has."""
+    if a == b:
+        return
+    key, (left, right) = ((a, b), sides) if a < b else ((b, a), sides[::-1])
+    known = edges.get(key, (empty, empty))
+    edges[key] = (known[0] if left == empty else left, known[1] if right == empty else right)
+
+
+def borders(edges: Mapping[tuple[End, End], tuple[int, int]]) -> dict[tuple[End, End], tuple[int, int]]:
+    """Edges between two different regions."""
+    return {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
 
 
 def _rounded(p: Point) -> Point:

@@ -13,7 +13,7 @@ from shapely import STRtree, box
 
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.units import M_PER_MM
-from sensorgen.solvers.contact.cell import OUTSIDE, ContactCell
+from sensorgen.solvers.contact.cell import OUTSIDE, ContactCell, add, borders
 from sensorgen.solvers.contact.contact import Faces
 from sensorgen.solvers.contact.mesh import TriangleMesh, at_border
 
@@ -149,10 +149,7 @@ def closed(edges: Sides, air: int, places: Real, faces: Faces) -> Sides:
     for run, sides in edges.items():
         way = ways.get(run) or ways.get(run[::-1], [])[::-1] or instead[list(run)].tolist()
         for a, b in pairwise(way):
-            if a != b:
-                key, here = ((a, b), sides) if a < b else ((b, a), sides[::-1])
-                before = merged.get(key, (air, air))
-                merged[key] = (before[0] if here[0] == air else here[0], before[1] if here[1] == air else here[1])
+            add(merged, a, b, sides, air)
     return merged
 
 
@@ -263,4 +260,4 @@ def _edges(cell: ContactCell, mesh: TriangleMesh) -> Sides:
     for (p, q), sides in cell.edges.items():
         if air != OUTSIDE and set(sides) == {air, OUTSIDE}:
             sides_of[nodes[p], nodes[q]] = sides
-    return {run: sides for run, sides in sides_of.items() if sides[0] != sides[1]}
+    return borders(sides_of)

@@ -243,10 +243,13 @@ def notches(cell: ContactCell) -> list[Point]:
         if left != right:
             for (p, q), solid in ((edge, left), (edge[::-1], right)):
                 ways.setdefault(p, []).append((atan2(q[1] - p[1], q[0] - p[0]), solid))
-    alone = {place: out_of for place, out_of in ways.items() if len(out_of) == 2}
-    halves = {place: pi / 2 if place[0] in (cell.left_mm, cell.right_mm) else pi for place in alone}
-    angles = {place: _filled(out_of) for place, out_of in alone.items()}
-    return [place for place, half in halves.items() if angles[place] > half and abs(angles[place] - pi) > _SHARP]
+    sharp = []
+    for place, out_of in ways.items():
+        if len(out_of) == 2:
+            half, angle = pi / 2 if place[0] in (cell.left_mm, cell.right_mm) else pi, _filled(out_of)
+            if angle > half and abs(angle - pi) > _SHARP:
+                sharp.append(place)
+    return sharp
 
 
 def _filled(ways: list[tuple[float, bool]]) -> float:

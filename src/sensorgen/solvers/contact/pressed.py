@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
@@ -303,11 +303,7 @@ def joined(parts: Sequence[Pressed], last_pa: float) -> Pressed:
     That one of them ended early is a fault only where none goes on.
     """
     used = [parts[0], *(part for part in parts[1:] if len(part.stress_pa) > 1)]
-    arrays = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
-    lists = ("capacitance_f_per_m2", "carried", "apex_m")
-    tails = [part if part is used[0] else replace(part, **{k: getattr(part, k)[1:] for k in _BY_LOAD}) for part in used]
-    whole: dict[str, Any] = {k: np.concatenate([getattr(part, k) for part in tails]) for k in arrays}
-    whole |= {k: tuple(each for part in tails for each in getattr(part, k)) for k in lists}
+    whole = _columns(used)
     reached = whole["stress_pa"][-1]
     short = (
         [f"converged up to {reached / 1e3:.4g} of {last_pa / 1e3:.4g} kPa"] if reached < last_pa * (1 - 1e-9) else []
@@ -315,6 +311,15 @@ def joined(parts: Sequence[Pressed], last_pa: float) -> Pressed:
     faults = dict.fromkeys(fault for part in used for fault in part.faults if not fault.startswith("converged up to"))
     doubts = dict.fromkeys(doubt for part in used for doubt in part.doubts)
     return replace(used[0], faults=(*short, *faults), doubts=tuple(doubts), **whole)
+
+
+def _columns(parts: Sequence[Pressed]) -> dict[str, Any]:
+    """Columns by load of solutions that continue each other, each of which begins with the unloaded cell."""
+    whole: dict[str, Any] = {}
+    for name in _BY_LOAD:
+        runs = [getattr(parts[0], name), *(getattr(part, name)[1:] for part in parts[1:])]
+        whole[name] = np.concatenate(runs) if isinstance(runs[0], np.ndarray) else tuple(chain.from_iterable(runs))
+    return whole
 
 
 def compared(coarser: Pressed, finer: Pressed) -> Pressed:

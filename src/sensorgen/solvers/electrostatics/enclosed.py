@@ -45,20 +45,19 @@ def enclosing(cell: LayerCell, grid_mm: float, far_mm: float, loose_mm: float, *
     """
     order = np.argsort(cell.permittivity, kind="stable")[::-1]
     levels_of = [_levels(cell, own, order) for own in cell.regions]
-    far = _far(cell, far_mm)
+    far = [*_far(cell, far_mm), False]
     moved: list[Levels] = []
     k = 0
     while k < len(levels_of):
         group, more = levels_of[k], k + 1
-        while far[k] and more < len(levels_of) and far[more]:
-            wider = [_both(pair, outwards) for pair in zip(group, levels_of[more], strict=True)]
-            other = [_both(pair, not outwards) for pair in zip(group, levels_of[more], strict=True)]
-            if any(not shapely.equals(a, b) and not _near(a, b, outwards, 2 * loose_mm) for a, b in
-                   zip(wider, other, strict=True)):  # fmt: skip
+        while far[k] and far[more]:
+            wider = _together(group, levels_of[more], outwards, 2 * loose_mm)
+            if not wider:
                 break
             group, more = wider, more + 1
-        by = _MARGIN * grid_mm + (loose_mm if far[k] else 0.0)
-        one = [_moved(region, cell, by if outwards else -by, loose_mm if far[k] else 0.0) for region in group]
+        loose = loose_mm if far[k] else 0.0
+        by = (_MARGIN * grid_mm + loose) * (1 if outwards else -1)
+        one = [_moved(region, cell, by, loose) for region in group]
         moved += [one] * (more - k)
         k = more
     return replace(cell, regions=[_regions(cell, levels, order) for levels in moved])
@@ -107,6 +106,13 @@ def _far(cell: LayerCell, far_mm: float) -> list[bool]:
         apart = min((max(bottom - z1, z0 - top) for k, (z0, z1) in spans.items() if [k] != metal), default=np.inf)
         far.append(len(metal) == 1 and not plate and apart > far_mm)
     return far
+
+
+def _together(one: Levels, next_one: Levels, outwards: bool, near_mm: float) -> Levels:
+    """Levels that stand for those of two layers; none where outlines of the two are not near each other."""
+    wider, other = ([_both(pair, way) for pair in zip(one, next_one, strict=True)] for way in (outwards, not outwards))
+    pairs = zip(wider, other, strict=True)
+    return wider if all(shapely.equals(a, b) or _near(a, b, outwards, near_mm) for a, b in pairs) else []
 
 
 def _both(pair: Sequence[Any], outwards: bool) -> Any:

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.arrays import Real, Whole
-from sensorgen.solvers.electrostatics.cones import Cone, RingLayout, ring_corners
+from sensorgen.solvers.electrostatics.elements import Cone, RingLayout, condensed, crossed, numbered, ring_corners
 from sensorgen.solvers.electrostatics.elimination import HELD, Block, Numbers, least
 from sensorgen.solvers.electrostatics.mesh import Cones, Flow
-from sensorgen.solvers.electrostatics.polynomials import condensed, crossed, numbered
 from sensorgen.solvers.electrostatics.triangles import Edge
 
 

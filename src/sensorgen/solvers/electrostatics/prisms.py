@@ -5,7 +5,7 @@ further points; the triangles become prisms between planes that crowd where cond
 floats: its potential is the one at which its net charge is zero, for each bound by a Schur complement.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
@@ -116,27 +116,7 @@ def plan(cell: LayerCell, beside_mm: Sequence[float], grid_mm: float) -> PlanTri
         for layer in cell.regions
     ]
     x, y = count.tolist()
-    sides = shapely.box(0.0, 0.0, x, y).exterior
-    edges = shapely.boundary([region for layer in layers for region in layer.values()])
-    metal = [
-        shapely.union_all([r for kind, r in layer.items() if kind < cell.conductors - cell.in_shell], grid_size=1)
-        for layer in layers
-    ]
-    lines = [sides, *edges]
-    for far in np.array(beside_mm) / grid_mm:
-        near = [beyond(_simpler(region, far / 5), (x, y), cell.periodic, np.ceil(2 * far)) for region in metal]
-        wide, narrow = (
-            shapely.buffer(near, way * far, join_style="mitre", mitre_limit=MITRE, quad_segs=2) for way in (1, -1)
-        )
-        beside = shapely.union_all(shapely.difference(wide, narrow))
-        outline = shapely.boundary(shapely.set_precision(shapely.simplify(beside, far / 10), max(far / 10, 1.0)))
-        lines.append(shapely.difference(shapely.clip_by_rect(outline, 0.0, 0.0, x, y), sides))
-    for axis, places in enumerate(cell.cuts_mm):
-        lines += [
-            shapely.LineString(((at, 0.0), (at, y)) if axis == 0 else ((0.0, at), (x, at)))
-            for at in np.rint(np.array(places) / pitch[axis]).tolist()
-        ]
-    noded = shapely.union_all(lines, grid_size=1)
+    noded = shapely.union_all(_lines(cell, layers, np.array(beside_mm) / grid_mm, pitch, (x, y)), grid_size=1)
     if any(cell.periodic):
         noded = shapely.union_all([noded, _repeated(noded, (x, y), cell.periodic)], grid_size=1)
     faces = shapely.get_parts(shapely.polygonize([noded]))
@@ -151,6 +131,38 @@ def plan(cell: LayerCell, beside_mm: Sequence[float], grid_mm: float) -> PlanTri
     if int(np.abs(area).sum()) != 2 * int(x) * int(y) or not area.all():
         raise Unsolved(f"outlines nearer to each other than the grid of {grid_mm:g} mm: triangles do not fill the plan")
     return PlanTriangles(points * pitch, triangles, _filled(layers, faces, cell)[:, of_face])
+
+
+def _lines(
+    cell: LayerCell, layers: Sequence[Mapping[int, Any]], distances: Real, pitch_mm: Real, size: tuple[float, float]
+) -> list[Any]:
+    """Outlines of layers, lines at some distances beside those of conductors, and cuts, in pitches of the grid."""
+    x, y = size
+    sides = shapely.box(0.0, 0.0, x, y).exterior
+    edges = shapely.boundary([region for layer in layers for region in layer.values()])
+    metal = [
+        shapely.union_all([r for kind, r in layer.items() if kind < cell.conductors - cell.in_shell], grid_size=1)
+        for layer in layers
+    ]
+    lines = [sides, *edges]
+    for far in distances.tolist():
+        near = [beyond(_simpler(region, far / 5), (x, y), cell.periodic, np.ceil(2 * far)) for region in metal]
+        lines.append(shapely.difference(shapely.clip_by_rect(_beside(near, far), 0.0, 0.0, x, y), sides))
+    for axis, places in enumerate(cell.cuts_mm):
+        lines += [
+            shapely.LineString(((at, 0.0), (at, y)) if axis == 0 else ((0.0, at), (x, at)))
+            for at in np.rint(np.array(places) / pitch_mm[axis]).tolist()
+        ]
+    return lines
+
+
+def _beside(regions: Sequence[Any], far: float) -> Any:
+    """Lines at a distance to both sides of the outlines of some regions, drawn together to a tenth of it."""
+    wide, narrow = (
+        shapely.buffer(regions, way * far, join_style="mitre", mitre_limit=MITRE, quad_segs=2) for way in (1, -1)
+    )
+    beside = shapely.union_all(shapely.difference(wide, narrow))
+    return shapely.boundary(shapely.set_precision(shapely.simplify(beside, far / 10), max(far / 10, 1.0)))
 
 
 def _simpler(region: Any, by: float) -> Any:

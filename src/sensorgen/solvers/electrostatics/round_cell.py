@@ -1,6 +1,6 @@
 """A cell between mirrors with prisms, bodies of revolution, lofts and polyhedra in it, as plain data."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 from math import atan, hypot, sqrt
@@ -219,16 +219,29 @@ def touches(cell: RoundCell) -> list[DomeTouch]:
     for own, piece, kind in cell.boxes():
         if not isinstance(piece, Revolved):
             continue
-        arcs = [edge for edge in profile(piece) if edge.bulge]
-        poles = [(edge.circle(), z) for edge in arcs for r, z in (edge.start, edge.end) if r < SAME_MM]
-        for (centre, radius), z in poles:
-            upwards, others = z < centre[1], [(box, its) for box, _, its in cell.boxes() if its != kind]
-            if abs(centre[0]) < SAME_MM and any(_faces(box, own[:2].mean(1), z, upwards) for box, _ in others):
-                way = -1.0 if upwards else 1.0
-                metal = [box[2, int(upwards)] for box, its in others if its < cell.conductors]
-                apart = min((off for end in metal if (off := way * (end - z)) > SAME_MM), default=radius)
-                places_of.append(DomeTouch(piece, kind, z, upwards, radius, float(apart)))
+        others = [(box, its) for box, _, its in cell.boxes() if its != kind]
+        for z, upwards, radius in _poles(piece):
+            if any(_faces(box, own[:2].mean(1), z, upwards) for box, _ in others):
+                metal = [box for box, its in others if its < cell.conductors]
+                places_of.append(DomeTouch(piece, kind, z, upwards, radius, _apart(metal, z, upwards, radius)))
     return places_of
+
+
+def _apart(metal: Sequence[Real], z_mm: float, upwards: bool, most_mm: float) -> float:
+    """Distance from a dome's pole to the nearest conductor behind the face that it touches [mm]."""
+    way = -1.0 if upwards else 1.0
+    offs = (way * (box[2, int(upwards)] - z_mm) for box in metal)
+    return float(min((off for off in offs if off > SAME_MM), default=most_mm))
+
+
+def _poles(piece: Revolved) -> Iterator[tuple[float, bool, float]]:
+    """Where domes of a piece meet its axis: height, whether the dome lies above, and its radius [mm]."""
+    for edge in profile(piece):
+        for r, z in (edge.start, edge.end) if edge.bulge else ():
+            if r < SAME_MM:
+                centre, radius = edge.circle()
+                if abs(centre[0]) < SAME_MM:
+                    yield z, z < centre[1], radius
 
 
 def inside(piece: Piece, places_mm: Real) -> Mask:

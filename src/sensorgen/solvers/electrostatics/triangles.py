@@ -11,8 +11,9 @@ from math import atan2, hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.scene.sections import ROUNDING_MM, Section
-from sensorgen.scene.unit_cell import SectionCell, cell
+from sensorgen.core.arrays import Whole
+from sensorgen.scene.sections import ROUNDING_MM, Section, distinct
+from sensorgen.scene.unit_cell import Band, SectionCell, Slice, cell
 
 Edge = tuple[int, int]
 Triangle = tuple[int, int, int]
@@ -82,15 +83,21 @@ def _triangulated(points: NDArray[np.float64], filled: "_Filled") -> tuple[Trian
         for edge in edges_of(corners):
             owners[edge].append(number)
     inside = _between_electrodes(filled, owners)
+    numbers = sorted(inside)
+    regions = [filled[n][1] for n in numbers]
+    terminals = _terminals(filled, owners, inside)
+    mesh = Triangles(points, flipped(points, [filled[n][0] for n in numbers], regions), regions, terminals)
+    return apart(mesh), owners, inside
+
+
+def _terminals(filled: "_Filled", owners: Mapping[Edge, Sequence[int]], inside: set[int]) -> dict[Edge, str]:
+    """Electrode at each edge of the dielectric that has one."""
     terminals = {}
     for edge, sides in owners.items():
         names = {filled[n][1][0] for n in sides}
         if names & {"@top", "@bottom"} and any(n in inside for n in sides):
             terminals[edge] = next(n[1:] for n in names if n.startswith("@"))
-    numbers = sorted(inside)
-    regions = [filled[n][1] for n in numbers]
-    mesh = Triangles(points, flipped(points, [filled[n][0] for n in numbers], regions), regions, terminals)
-    return apart(mesh), owners, inside
+    return terminals
 
 
 def _between_electrodes(filled: "_Filled", owners: Mapping[Edge, Sequence[int]]) -> set[int]:
@@ -139,26 +146,32 @@ _Filled = list[tuple[Triangle, tuple[str, float]]]
 def _all(cell: SectionCell) -> tuple[NDArray[np.float64], _Filled]:
     """All triangles of a cell, those of electrodes with "@top" or "@bottom" for a material."""
     ends = [cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)]
-    levels = []  # heights at which anything meets the line between slice k - 1 and slice k
-    for k in range(len(ends)):
-        sides = zip(cell.slices[max(k - 1, 0) : k + 1], (1, 0) if k else (0,), strict=False)
-        heights = sorted(z for s, side in sides for b in s.bands for z in (b.bottom_mm[side], b.top_mm[side]))
-        levels.append([z for n, z in enumerate(heights) if n == 0 or z - heights[n - 1] > ROUNDING_MM])
+    levels = [_levels(cell.slices, k) for k in range(len(ends))]
     first = np.concatenate([[0], np.cumsum([len(z) for z in levels])])
     points = np.array([(x, z) for x, heights in zip(ends, levels, strict=True) for z in heights])
     filled: _Filled = []
     for k, (here, share) in enumerate(zip(cell.slices, cell.shares, strict=True)):
         for band in here.bands:
-            taken = []  # levels from the band's lower to its upper line, at its left and right side
-            for side, lines in enumerate(zip(band.bottom_mm, band.top_mm, strict=True)):
-                low, high = lines[0] - 2 * ROUNDING_MM, lines[1] + 2 * ROUNDING_MM
-                within = range(bisect_left(levels[k + side], low), bisect_left(levels[k + side], high))
-                taken.append([int(first[k + side]) + n for n in within])
-            left, right = taken
             region = (f"@{band.terminal}" if band.terminal else band.material, share)
-            polygon = [*left[::-1], *right]
+            polygon = _corners(levels, first, k, band)
             filled += [(corners, region) for corners in fan(points[polygon], polygon)]
     return points, filled
+
+
+def _levels(slices: Sequence[Slice], k: int) -> list[float]:
+    """Heights at which anything meets the line between slice k - 1 and slice k [mm]."""
+    sides = zip(slices[max(k - 1, 0) : k + 1], (1, 0) if k else (0,), strict=False)
+    return distinct((z for s, side in sides for b in s.bands for z in (b.bottom_mm[side], b.top_mm[side])), ROUNDING_MM)
+
+
+def _corners(levels: Sequence[Sequence[float]], first: Whole, k: int, band: Band) -> list[int]:
+    """Corners of a band of slice k, counter-clockwise, those of its neighbours on its sides among them."""
+    sides = []
+    for line, lines in enumerate(zip(band.bottom_mm, band.top_mm, strict=True), k):
+        low, high = lines[0] - 2 * ROUNDING_MM, lines[1] + 2 * ROUNDING_MM
+        within = range(bisect_left(levels[line], low), bisect_left(levels[line], high))
+        sides.append([int(first[line]) + n for n in within])
+    return [*sides[0][::-1], *sides[1]]
 
 
 def fan(places: NDArray[np.float64], polygon: list[int]) -> Iterable[Triangle]:
@@ -315,15 +328,20 @@ def fans(triangles: Sequence[Triangle]) -> dict[int, list[Fan]]:
     for corner, by_first in around.items():  # from each triangle's first spoke to its number and last spoke
         lasts = {last for _, last in by_first.values()}
         for start in [first for first in by_first if first not in lasts] or [next(iter(by_first))]:
-            fan, spoke = Fan([], []), start
-            while spoke in by_first and not (fan.spokes and spoke == start):
-                fan.spokes.append(spoke)
-                number, spoke = by_first[spoke]
-                fan.members.append(number)
-            if spoke != start:
-                fan.spokes.append(spoke)
-            by_corner[corner].append(fan)
+            by_corner[corner].append(_fan(by_first, start))
     return by_corner
+
+
+def _fan(by_first: Mapping[int, tuple[int, int]], start: int) -> Fan:
+    """Triangles around a corner from a spoke on."""
+    fan, spoke = Fan([], []), start
+    while spoke in by_first and not (fan.spokes and spoke == start):
+        fan.spokes.append(spoke)
+        number, spoke = by_first[spoke]
+        fan.members.append(number)
+    if spoke != start:
+        fan.spokes.append(spoke)
+    return fan
 
 
 def energy(section: Section, height_mm: float, permittivity: Mapping[str, float]) -> float:

@@ -12,7 +12,7 @@ from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import ROUNDING_MM, Section, sections
 from sensorgen.scene.unit_cell import Slice, cell
 from sensorgen.solvers.electrostatics.bounds import unmirrored
-from sensorgen.solvers.electrostatics.bricks import Grid, grid
+from sensorgen.solvers.electrostatics.boxes import Grid, grid
 
 Vertex = tuple[float, float]
 Edge = tuple[Vertex, Vertex]

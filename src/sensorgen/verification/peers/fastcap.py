@@ -13,7 +13,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
-from sensorgen.solvers.electrostatics.bricks import Grid
+from sensorgen.solvers.electrostatics.boxes import Grid
 from sensorgen.verification.peers import cells
 
 _RINGS = 2  # of mirror images, at least

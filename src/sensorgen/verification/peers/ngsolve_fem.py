@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
-from sensorgen.solvers.electrostatics.bricks import Grid
+from sensorgen.solvers.electrostatics.boxes import Grid
 from sensorgen.verification.peers import cells
 
 _ORDER = 3  # on triangles

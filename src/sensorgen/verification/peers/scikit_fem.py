@@ -7,7 +7,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
-from sensorgen.solvers.electrostatics.bricks import Grid
+from sensorgen.solvers.electrostatics.boxes import Grid
 from sensorgen.verification.peers import cells
 
 _NEAR_MM = 1e-9

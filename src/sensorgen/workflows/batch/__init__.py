@@ -18,7 +18,7 @@ from sensorgen.core.parallel import remembered
 from sensorgen.design.design import Design
 from sensorgen.export import slicing, threemf
 from sensorgen.export.gcode.check import check_motion
-from sensorgen.export.slicers import TIME_LIMIT_S, curaengine
+from sensorgen.export.slicers import TIME_LIMIT_S, cura
 from sensorgen.export.slicers.versions import parse
 from sensorgen.export.slicing import Placed, Sliced
 from sensorgen.prediction import bodies
@@ -275,7 +275,7 @@ def _gcode(
         (inside / settings).replace(own / settings)
     else:
         settings = "settings.json"
-        engine = curaengine.engine_settings(
+        engine = cura.engine_settings(
             machine, plate[0].design.layers, slicing.plate_loads(plate), parse(sliced.version)
         )
         store.write(own, {settings: json_bytes(asdict(engine))})

@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.design.printer import Printer, Quality
-from sensorgen.design.tower import tower
+from sensorgen.design.printer import Printer, Quality, tower
 from sensorgen.scene.drawing.paper import box, element, fitted, text
 from sensorgen.workflows.batch.plan import PrintPiece
 

@@ -26,7 +26,7 @@ from sensorgen.analysis.characterise.catalogue import (
 )
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design
-from sensorgen.design.tower import tower
+from sensorgen.design.printer import tower
 from sensorgen.export import threemf
 from sensorgen.export.slicers import prusa
 from sensorgen.export.slicers.loads import loads

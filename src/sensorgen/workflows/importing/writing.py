@@ -187,7 +187,7 @@ def _exact(body: ReadBody, low: Real, high: Real) -> tuple[Piece, ...]:
 
 def _flat(body: ReadBody, low: Real) -> tuple[Piece, ...]:
     """A body as prisms or polyhedra in the sensor's coordinates."""
-    from sensorgen.scene.geometry.recognition import pieces
+    from sensorgen.scene.geometry.surfaces import pieces
 
     return pieces([Mesh(shell.vertices_mm - low, shell.triangles) for shell in body.shells], body.given.rounding_mm)
 
