@@ -268,9 +268,7 @@ def _by_specimen(
     return by_name
 
 
-def _by_name(
-    name: str, of: Print | None, by_kind: Callable[[SpecimenName], Design | None]
-) -> Design | str | None:  # fmt: skip
+def _by_name(name: str, of: Print | None, by_kind: Callable[[SpecimenName], Design | None]) -> Design | str | None:
     """Design that a specimen's name stands for, or why it has none; None where its print may be of several."""
     try:
         design = by_kind(replace(parse(name), iteration=None, replicate=None, place=""))

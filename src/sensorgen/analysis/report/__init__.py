@@ -195,7 +195,7 @@ def report(
     return Report(
         iteration, specimens, datetime.now(UTC).isoformat(timespec="seconds"),
         (*headline, *recordings.headline(impedances), *_basis(comparison, recorded)), findings,
-        tuple(s for s in sections if s.tables or s.figures or s.drawings),
+        tuple(s for s in sections if any((s.tables, s.figures, s.drawings))),
     )  # fmt: skip
 
 

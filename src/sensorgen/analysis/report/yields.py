@@ -141,10 +141,10 @@ def _difference(comparison: Comparison, by: str) -> Iterator[str]:
 def _parted(comparison: Comparison) -> Iterator[str]:
     """Specimens whose electrodes touch as drawn, judged by their gap as printed."""
     parted = comparison.last.where(lambda row: bool(row.predicted and row.predicted.parted))
-    orders = [row.verdict.same_order for row in parted if row.verdict.same_order is not None]
+    judged = [row for row in parted if row.verdict.same_order is not None]
+    orders = [bool(row.verdict.same_order) for row in judged]
     if orders:
-        of = (row.predicted for row in parted if row.predicted and row.verdict.same_order is not None)
-        gaps = {one.design: one.prediction.gap for one in of}
+        gaps = {row.predicted.design: row.predicted.prediction.gap for row in judged if row.predicted}
         gap = "; ".join(f"{name} {bounds.words()}" for name, bounds in sorted(gaps.items()) if bounds)
         yield (
             f"Electrodes that touch as drawn, but have a gap as printed ({gap}): {sum(orders)} of {len(orders)} such "
