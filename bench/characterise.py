@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "models"))
 
 import virtual_lab
 
-from sensorgen.analysis.characterise import selection
+from sensorgen.analysis.characterise import posterior as posteriors
 from sensorgen.analysis.characterise.catalogue import Meters
 from sensorgen.analysis.characterise.posterior import posterior
 from sensorgen.workflows.characterise import HOURS, MOST, Study, named
@@ -49,8 +49,8 @@ def labs(study, coupons, count, *, dead, seed):
 
 def main(count=200):
     study = Study.of("diabase-h5", ["etpu", "x60"])
-    found = selection.candidates(study.coupons, study.unknowns, study.targets, Meters())
-    chosen = selection.select(
+    found = posteriors.candidates(study.coupons, study.unknowns, study.targets, Meters())
+    chosen = posteriors.select(
         found, MOST - 1, lambda s: study.hours([study.coupons[k] for k in s]) <= HOURS
     )  # fmt: skip
     coupons = named([study.coupons[k] for k in chosen])

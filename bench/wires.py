@@ -16,8 +16,8 @@ from sensorgen.core.arrays import Real
 from sensorgen.design.design import make
 from sensorgen.models.line import cascade
 from sensorgen.prediction.array.model import ArrayModel, array_model
-from sensorgen.prediction.array.presses import count as presses_at
 from sensorgen.prediction.array.readout import ArrayReadout
+from sensorgen.prediction.array.study import count as presses_at
 from sensorgen.prediction.array.study import study
 
 RESULTS = Path(__file__).parent / "results"

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from sensorgen.analysis.plots import results, static
-from sensorgen.analysis.plots.response import identifiability_figure
+from sensorgen.analysis.plots.results import identifiability_figure
 from sensorgen.asprinted import printed as prints
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.design import make

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from sensorgen.analysis.comparison.specimens import of_iteration
+from sensorgen.analysis.comparison import of_iteration
 from sensorgen.analysis.report.electrodes import usable
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.units import EPS0_F_PER_M

@@ -10,8 +10,8 @@ from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.calibration.fitting import Data
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
-from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import Query, Tip
+from sensorgen.prediction.sensor_model import sensor_model
 
 DESIGN = {  # the independent strip's electrodes are those of the thesis's Table C.1: 8.64 kohm
     "shape": "tri", "parameters": {"dielectric_mm": 0.2},

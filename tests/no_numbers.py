@@ -38,7 +38,7 @@ def at_rest(folder="at-rest"):
 @contextmanager
 def roughly_at_rest():
     """Resistance as ever, capacitance of the likely print by closed forms, no load; for readings of a multimeter."""
-    from sensorgen.prediction import capacitance, planning, rest_state
+    from sensorgen.prediction import capacitance, rest_state, sensor_model
 
     with pytest.MonkeyPatch.context() as patch, at_rest("rough"):
         for name in ("PLANE", "SPATIAL", "OPEN"):
@@ -46,5 +46,5 @@ def roughly_at_rest():
         patch.setattr(rest_state, "PLANE", 10.0)
         patch.setattr(rest_state, "_other_prints", lambda *_: ([], [], False))
         patch.setattr(rest_state, "_film_ratios", lambda *_: (1.0, 1.0, 0.0))
-        patch.setattr(planning, "ACCURACY", 10.0)
+        patch.setattr(sensor_model, "ACCURACY", 10.0)
         yield

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sensorgen.analysis.plots import response as plots
+from sensorgen.analysis.plots import results as plots
 from sensorgen.analysis.plots.static import drawn as drawn_by
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor

@@ -16,8 +16,8 @@ from sensorgen.models import compression
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.capacitance import Answer
 from sensorgen.prediction.compression_law import law_of
-from sensorgen.prediction.planning import execute, plan
 from sensorgen.prediction.query import Load
+from sensorgen.prediction.sensor_model import execute, plan
 
 GAPS = Answer("columns", Interval(1e-10, 2e-10), ())
 OTHER = {"shape": "tri", "parameters": {"period_mm": 2.5}}

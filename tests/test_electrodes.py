@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from sensorgen.analysis.comparison.specimens import _per_resistivity
+from sensorgen.analysis.comparison import _per_resistivity
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body, Cells
 from sensorgen.design.design import make
 from sensorgen.models.conduction import electrode_resistance as of_scene
 from sensorgen.prediction.bodies import drawn, estimated
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.rest_state import electrode_resistance
+from sensorgen.prediction.sensor_model import sensor_model
 from sensorgen.scene.scene import Scene, box
 
 PLATE_OHM = {"top": 0.042 / 3e-5, "bottom": 0.042 / 3e-5}  # rho L / (H W)

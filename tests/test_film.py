@@ -13,10 +13,9 @@ from sensorgen.models import columns, fem3d, sandwich
 from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import solved
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import TONES_HZ, Query
 from sensorgen.prediction.rest_state import rest_state
-from sensorgen.prediction.sensor_model import build_sensor, piece
+from sensorgen.prediction.sensor_model import build_sensor, piece, sensor_model
 
 EPS = {"x60": 4.68, "air": 1.00059}
 

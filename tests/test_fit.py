@@ -13,11 +13,10 @@ from drawn_sensor import sensor_of
 from scipy import stats
 
 from no_numbers import roughly_at_rest
+from sensorgen.analysis.comparison import AllowedValues
 from sensorgen.analysis.comparison.expected import Movable
-from sensorgen.analysis.comparison.specimens import AllowedValues
-from sensorgen.analysis.fit import Fit, Fitted, Untold, fit, text
-from sensorgen.analysis.fit.estimates import OfSpecimen, _together, leak, resistivity, values
-from sensorgen.analysis.fit.fitting import held_back
+from sensorgen.analysis.fit import fit, held_back
+from sensorgen.analysis.fit.estimates import Fit, Fitted, OfSpecimen, Untold, _together, leak, resistivity, text, values
 from sensorgen.cli import cli
 from sensorgen.core.document import text as document_text
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName

@@ -225,7 +225,7 @@ def fit(asked):
 def invert(asked):
     """The sensor that ``invert`` searches."""
     from sensorgen.prediction import bodies
-    from sensorgen.prediction.planning import sensor_model
+    from sensorgen.prediction.sensor_model import sensor_model
 
     return Answer(
         *(

@@ -13,7 +13,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.design.tip import EVEN
 from sensorgen.prediction import compression_law as celllaw
-from sensorgen.prediction import planning, rest_state
+from sensorgen.prediction import rest_state, sensor_model
 from sensorgen.prediction.bodies import drawn, estimated
 from sensorgen.prediction.capacitance import PLANE, Answer
 from sensorgen.prediction.query import Load as Press
@@ -31,7 +31,7 @@ def tri(dielectric_mm):
 
 
 def worked_out(design, accuracy, press=PRESS, law="", **tip):
-    return planning.execute(planning.plan(drawn(design), press, accuracy, law, Tip(**tip)))
+    return sensor_model.execute(sensor_model.plan(drawn(design), press, accuracy, law, Tip(**tip)))
 
 
 def chosen(plan):
@@ -46,7 +46,7 @@ def off(one, other, press=PRESS):
 
 def test_without_an_accuracy_the_capacitance_is_known_to_the_default():
     sensed, plan = worked_out(tri(0.1), None)
-    assert plan.accuracy == planning.ACCURACY
+    assert plan.accuracy == sensor_model.ACCURACY
     assert sensed.rest.answer.model == "fem2d"
     assert sensed.rest.capacitance.model.width() <= PLANE
 
@@ -159,7 +159,7 @@ def test_without_force_nothing_has_to_give_way():
 
 def test_bounds_far_apart_are_felt_most_at_the_lower_one(monkeypatch):
     """At a low tone abs(Z) goes with 1/C: half of a large width would say too little."""
-    for module in (planning, rest_state):
+    for module in (sensor_model, rest_state):
         monkeypatch.setattr(module, "default_width", lambda scene: 2.0)
     sensed, plan = worked_out(tri(0.1), 2.0, Press((1.0,), 0.0, 0.05))
     bounds = sensed.rest.answer.capacitance_f
@@ -177,7 +177,7 @@ def test_the_outline_says_what_is_expected_and_asks_nothing_dear(monkeypatch):
 
     for model in (fem2d, press2d):
         monkeypatch.setattr(model, "press" if model is press2d else "capacitance", None)
-    outline = planning.plan(drawn(tri(0.15)), PRESS, 1e-2)
+    outline = sensor_model.plan(drawn(tri(0.15)), PRESS, 1e-2)
     cell, compression, line = outline.plan.levels
     assert (cell.chosen, compression.chosen, line.chosen) == ("fem2d", "press2d, mesh x 1.5", "line, 1 section")
     assert compression.candidates[0].expected_width == math.inf
@@ -189,7 +189,7 @@ def test_the_outline_says_what_is_expected_and_asks_nothing_dear(monkeypatch):
 @pytest.mark.parametrize("accuracy", [0.0, -1.0, math.nan])
 def test_an_accuracy_is_above_0(accuracy):
     with pytest.raises(OutOfRange, match="above 0"):
-        planning.plan(drawn(tri(0.1)), PRESS, accuracy)
+        sensor_model.plan(drawn(tri(0.1)), PRESS, accuracy)
 
 
 @needs_mesher

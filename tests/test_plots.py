@@ -18,7 +18,7 @@ from sensorgen.analysis import plots
 from sensorgen.analysis.plots import figure as figure_data
 from sensorgen.analysis.plots import pages, static
 from sensorgen.analysis.plots.figure import Map, frequency, scale
-from sensorgen.analysis.plots.response import (
+from sensorgen.analysis.plots.results import (
     LARGEST,
     MOST_FREQUENCIES,
     QUANTITIES,

@@ -35,10 +35,10 @@ from sensorgen.prediction.loaded import (
     impedance_grid,
     positions_mm,
 )
-from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import NOISE, TONES_HZ, Query
 from sensorgen.prediction.rest_state import Lost, rest_state
 from sensorgen.prediction.results import from_json, to_json
+from sensorgen.prediction.sensor_model import sensor_model
 
 EPS = {"x60": 4.68, "air": 1.00059}
 TABLE_3_2 = {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesis-3.2"}  # 1.2 S/m

@@ -11,8 +11,8 @@ import pytest
 from sensorgen.analysis.preview import _tornado
 from sensorgen.design.design import make
 from sensorgen.prediction import bodies
+from sensorgen.prediction.error_budget import by_first_layer, by_walls
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.print_faults import by_first_layer, by_walls
 from sensorgen.prediction.results import Changes, ErrorBudget, Term
 from sensorgen.scene.scene import Body, Scene, box
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import coo_array, diags_array
 from scipy.sparse.linalg import cg, spsolve
 
-from sensorgen.prediction.array.fringe import CrossingSection, fringe
+from sensorgen.prediction.array.model import CrossingSection, fringe
 
 EPS = {"film": 4.7, "cell": 5.0, "beside": 4.7, "solid": 4.7, "cover": 4.7, "air": 1.0}
 AIR = EPS | {"beside": 1.0}

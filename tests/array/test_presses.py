@@ -8,9 +8,8 @@ from sensorgen.design.design import make
 from sensorgen.measure.virtual.array import nodal
 from sensorgen.prediction.array.frames import at_rest
 from sensorgen.prediction.array.model import array_model
-from sensorgen.prediction.array.presses import PRESS_N, count, distance_mm, pressures
 from sensorgen.prediction.array.readout import ArrayReadout
-from sensorgen.prediction.array.study import study
+from sensorgen.prediction.array.study import PRESS_N, count, distance_mm, pressures, study
 
 
 @pytest.fixture(scope="module")

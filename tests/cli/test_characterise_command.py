@@ -12,7 +12,6 @@ import pytest
 import virtual_lab
 
 from sensorgen.analysis.characterise import posterior as posteriors
-from sensorgen.analysis.characterise import selection
 from sensorgen.analysis.characterise.catalogue import Meters, nominal
 from sensorgen.core.errors import OutOfRange
 from sensorgen.workflows.characterise import Study, plan, read
@@ -49,27 +48,27 @@ def own_folder(monkeypatch, tmp_path):
 def test_selection_equals_the_search_through_all_sets(study, seed):
     rng = np.random.default_rng(seed)
     some = [study.coupons[k] for k in sorted(rng.choice(len(study.coupons), 8, replace=False))]
-    found = selection.candidates(some, study.unknowns, study.targets, METERS)
+    found = posteriors.candidates(some, study.unknowns, study.targets, METERS)
     most = 0.6 * sum(c.volume_mm3 for c in some)
 
     def fits(chosen):
         return sum(some[k].volume_mm3 for k in chosen) <= most
 
     every = [s for n in range(1, 5) for s in combinations_with_replacement(range(8), n)]
-    allowed = [s for s in every if fits(s) and all(s.count(k) <= selection.COPIES for k in s)]
+    allowed = [s for s in every if fits(s) and all(s.count(k) <= posteriors.COPIES for k in s)]
     best = max(allowed, key=found.worth)
-    assert found.worth(selection.select(found, 4, fits)) == pytest.approx(found.worth(best), rel=1e-9)
+    assert found.worth(posteriors.select(found, 4, fits)) == pytest.approx(found.worth(best), rel=1e-9)
 
 
 def test_selection_without_room(study):
-    found = selection.candidates(study.coupons, study.unknowns, study.targets, METERS)
+    found = posteriors.candidates(study.coupons, study.unknowns, study.targets, METERS)
     with pytest.raises(OutOfRange, match="no coupon fits"):
-        selection.select(found, 5, lambda _: False)
+        posteriors.select(found, 5, lambda _: False)
 
 
 def test_goals_of_the_issue_are_expected_within_four_hours(study):
-    found = selection.candidates(study.coupons, study.unknowns, study.targets, METERS)
-    chosen = selection.select(found, 11, lambda s: study.hours([study.coupons[k] for k in s]) <= 4)
+    found = posteriors.candidates(study.coupons, study.unknowns, study.targets, METERS)
+    chosen = posteriors.select(found, 11, lambda s: study.hours([study.coupons[k] for k in s]) <= 4)
     expected = found.expected(chosen, study.unknowns)
     missed = {t.quantity for t in study.targets if t.goal and expected.interval(t).half_width() > t.goal}
     assert not missed

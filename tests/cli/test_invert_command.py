@@ -16,7 +16,7 @@ from sensorgen import cli
 from sensorgen.cli import main  # noqa: F401 - the fixtures run it
 from sensorgen.design.design import make
 from sensorgen.prediction.bodies import default_body
-from sensorgen.prediction.planning import sensor_model
+from sensorgen.prediction.sensor_model import sensor_model
 
 TONES = {"1.1kHz": 1.1e3, "10.1kHz": 10.1e3, "99.7kHz": 99.7e3, "0.5MHz": 5e5}
 QUIET = ["--noise", "0.01%"]  # as printed the film is 0.2 mm, and presses of 1 N are lost in the usual noise

@@ -20,13 +20,13 @@ from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import Query
-from sensorgen.workflows.optimise import front, ladder, recommend, result
-from sensorgen.workflows.optimise.front import Front, Reason, search, settled
+from sensorgen.workflows.moves import Candidate, EarlyNumber
+from sensorgen.workflows.optimise import front, ladder, result
+from sensorgen.workflows.optimise.front import Front, Reason, _objectives, sample, search, settled
 from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended
-from sensorgen.workflows.optimise.sample import _objectives, sample
+from sensorgen.workflows.optimise.run import _robust, within_tolerance
 from sensorgen.workflows.optimise.space import MOST, candidates, space
 from sensorgen.workflows.optimise.target import Target, load
-from sensorgen.workflows.search import Candidate, EarlyNumber
 from sensorgen.workflows.templates import new
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -225,7 +225,7 @@ def test_a_length_in_the_plane_is_varied_in_half_lines():
     assert [row.values["length_mm"] for row in search_.rows] == pytest.approx(lengths)
     row = search_.front[0]
     assert row.values["length_mm"] == pytest.approx(lengths[2])
-    wider = [design.params.length_mm for design in recommend.within_tolerance(search_.target, row.design)]
+    wider = [design.params.length_mm for design in within_tolerance(search_.target, row.design)]
     assert wider == pytest.approx([lengths[2] - 0.05, lengths[2] + 0.05])
 
 
@@ -418,7 +418,7 @@ def test_the_spread_is_under_the_worst_top_of_the_design(monkeypatch):
     wanted = target(objectives=FORCE)
     trial = replace(ladder.everything(make({"shape": "reference"}), wanted.query(), ""), doubts=())
     row = Candidate({}, make({"shape": "reference"}), 1, trial=trial)
-    spread = recommend._robust(wanted, [row], recommend.HERE, keep=False)[1]["force_resolution_n"]
+    spread = _robust(wanted, [row], front.HERE, keep=False)[1]["force_resolution_n"]
     assert {tops for rule, tops, _ in asked if rule} == {("stiff",)}
     assert spread.worst == pytest.approx(2 * spread.value)
     assert spread.median == pytest.approx(spread.value)

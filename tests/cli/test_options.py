@@ -233,7 +233,7 @@ def test_waived_findings_do_not_stop_a_build(run, tmp_path):
 
 
 def test_a_share_may_be_given_in_percent():
-    from sensorgen.cli.words import ShownShare
+    from sensorgen.cli.commands import ShownShare
     from sensorgen.core.errors import BadInput
 
     assert ShownShare().convert("20%", None, None) == ShownShare().convert("0.2", None, None) == 0.2

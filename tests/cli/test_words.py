@@ -3,7 +3,7 @@
 import click
 import pytest
 
-from sensorgen.cli.words import Values
+from sensorgen.cli.commands import Values
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import FORCE_N, FREQUENCY_HZ, LENGTH_MM
 

@@ -91,8 +91,8 @@ def test_finer_rasters_converge(tri):
 def test_the_print_is_what_the_models_predict(tri):
     """Another mesh, another contact, another mechanism of the tracks: C to 0.5 %, R to 0.2 %, the rise to 2 %."""
     from sensorgen.prediction import bodies
-    from sensorgen.prediction.planning import sensor_model
     from sensorgen.prediction.query import Query, Tip
+    from sensorgen.prediction.sensor_model import sensor_model
 
     sensor = sensor_model(bodies.estimated(tri.design), Query(tip=Tip(5e-3)))[0].sensor
     assert tri.capacitance_f_per_m == pytest.approx(sensor.capacitance_f_per_m, rel=5e-3)

@@ -14,8 +14,8 @@ from sensorgen.prediction.calibration.fitting import Data, calibrated
 from sensorgen.prediction.calibration.inversion import Inverter
 from sensorgen.prediction.calibration.materials import estimate, links
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
-from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import Query, Tip
+from sensorgen.prediction.sensor_model import sensor_model
 
 ETPU = "etpu@thesis-3.2"
 DESIGN = {

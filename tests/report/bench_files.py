@@ -8,7 +8,7 @@ import scipy.io as sio
 
 from sensorgen.analysis.comparison.expected import moved
 from sensorgen.prediction.bodies import default_body
-from sensorgen.prediction.planning import sensor_model
+from sensorgen.prediction.sensor_model import sensor_model
 
 HOSTILE = "</script><script>document.title='taken'</script><img src=x onerror=alert(1)> \"'&$\\frac{ =cmd|'/c calc'!A1"
 FORMULA = '=HYPERLINK("http://example.org";"x")'

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from sensorgen.analysis.comparison import of_iteration, predicted
+from sensorgen.analysis.comparison import of_iteration
+from sensorgen.analysis.comparison.expected import predicted
 from sensorgen.analysis.report import FORMATS, alternating, report, written
 from sensorgen.design.design import load
 from sensorgen.measure.log import Log, notes, prints

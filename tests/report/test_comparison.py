@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from bench_files import ladder
 
-from sensorgen.analysis.comparison import of_iteration, predicted
-from sensorgen.analysis.comparison.expected import Movable, at_rest, moved, pressed, stored_or_made
-from sensorgen.analysis.report.contents import origins
+from sensorgen.analysis.comparison import of_iteration
+from sensorgen.analysis.comparison.expected import Movable, at_rest, moved, predicted, pressed, stored_or_made
+from sensorgen.analysis.report import origins
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make

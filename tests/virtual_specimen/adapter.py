@@ -9,8 +9,8 @@ from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.calibration.fitting import Data
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
-from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import Query, Tip
+from sensorgen.prediction.sensor_model import sensor_model
 from virtual_specimen import TONES_HZ, Truth, drawn, session
 
 ETPU = "etpu@thesis-3.2"  # 1/1.2 ohm m

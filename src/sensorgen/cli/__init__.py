@@ -63,7 +63,7 @@ COMMANDS = tuple(name for commands in SECTIONS.values() for name in commands)
 _MODULES = {  # of commands, where it is not ``cli/NAME_command.py``
     "chart": "verification.chart_command",
     "thesis": "verification.thesis_command",
-    **dict.fromkeys(("check", "build", "slice", "optimise"), "cli.printing"),
+    **dict.fromkeys(("check", "build", "slice", "batch", "optimise"), "cli.printing"),
     **dict.fromkeys(("predict", "cell", "compress"), "cli.predictions"),
     **dict.fromkeys(("calibrate", "fit", "characterise", "report"), "cli.fitting"),
     **dict.fromkeys(("show", "draw", "export", "import"), "cli.views"),

@@ -114,8 +114,8 @@ def _model(design: "Design", experiment: "Experiment") -> "SpecimenModel":
     from sensorgen.analysis.calibration import Bench, spread_of
     from sensorgen.prediction import bodies
     from sensorgen.prediction.calibration.specimen import SpecimenModel
-    from sensorgen.prediction.planning import sensor_model
     from sensorgen.prediction.query import Query, Tip
+    from sensorgen.prediction.sensor_model import sensor_model
 
     tip_m = experiment.pressing.length_mm * 1e-3
     predicted, _ = sensor_model(bodies.default_body(design), Query(tip=Tip(tip_m)))

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import click
 
 from sensorgen.cli import render
-from sensorgen.cli.commands import command
+from sensorgen.cli.commands import NumberRange, command
 from sensorgen.cli.options import ColumnNames, LogFile
-from sensorgen.cli.words import NumberRange
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Annotated
 import click
 
 from sensorgen.cli import FOUND_ERRORS, inversion, options, render
-from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import FirstWord
 from sensorgen.cli.commands import command as of_function
+from sensorgen.cli.designs import BodyChoice
 from sensorgen.cli.inversion import ArrayOptions
 from sensorgen.cli.options import BenchTip, DryRun, LogFile, Out
 from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option
 
 if TYPE_CHECKING:
-    from sensorgen.analysis.fit import Fit
+    from sensorgen.analysis.fit.estimates import Fit
     from sensorgen.analysis.report import Report
     from sensorgen.core.document import Documented
     from sensorgen.measure.log import Log
@@ -122,8 +122,8 @@ def fit_command(
     """
     from dataclasses import replace
 
-    from sensorgen.analysis.fit import STEPS, fit, text
-    from sensorgen.analysis.fit.fitting import HELD_BACK
+    from sensorgen.analysis.fit import HELD_BACK, STEPS, fit
+    from sensorgen.analysis.fit.estimates import text
     from sensorgen.core import files
     from sensorgen.design.materials import own
 
@@ -268,8 +268,7 @@ def report_command(
     show_it, --open
         Show the page in the browser.
     """
-    from sensorgen.analysis.report import pieces
-    from sensorgen.analysis.report.contents import STEPS, report
+    from sensorgen.analysis.report import STEPS, pieces, report
 
     if show_it and (how != "html" or output == "-"):
         raise BadInput("--open shows an HTML file; expected --format html and a file")

@@ -8,8 +8,8 @@ import click
 
 from sensorgen.cli import render
 from sensorgen.cli.commands import command as of_function
+from sensorgen.cli.commands import completed, pairs
 from sensorgen.cli.options import LogFile, Strict
-from sensorgen.cli.words import completed, pairs
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.options import Argument, Option
 

@@ -17,10 +17,13 @@ from sensorgen.core.errors import BadInput, within
 from sensorgen.core.options import Argument, Option
 
 if TYPE_CHECKING:
+    from sensorgen.core.arrays import Real
     from sensorgen.core.document import Documented
     from sensorgen.design.design import Design
+    from sensorgen.measure.array_frames import Frames
     from sensorgen.measure.readings import Readings
     from sensorgen.prediction.array.frames import PressureMaps
+    from sensorgen.prediction.array.model import ArrayModel
     from sensorgen.prediction.array.sessions import ArrayCalibration
     from sensorgen.prediction.inverse.estimator import Prior
 
@@ -148,14 +151,21 @@ def invert(design: "Design", task: Task, frames: ArrayFrames) -> int:
     if frames.plot is not None:
         from sensorgen.analysis.plots import array, static
 
-        true = None if read_in.pressure_kpa is None else read_in.pressure_kpa[~read_in.rest]
-        true = model.carried(true) if true is not None and frames.cells else true
-        render.file(frames.plot / f"{design.name}-map.png", static.png(array.figure(maps, true)), "wrote ")
+        picture = static.png(array.figure(maps, _true_kpa(read_in, model, cells=frames.cells)))
+        render.file(frames.plot / f"{design.name}-map.png", picture, "wrote ")
     for piece in render.pieces(maps, render.form()):
         render.say(piece, nl=False, err=task.terminal)
     if not output:
         render.say("--output FILE.npz writes the maps, FILE.csv force and centre of pressure of every frame", err=True)
     return 0
+
+
+def _true_kpa(frames: "Frames", model: "ArrayModel", *, cells: bool) -> "Real | None":
+    """True pressures of the loaded frames, on the surface or as cells carry them; None where the file has none."""
+    if frames.pressure_kpa is None:
+        return None
+    true = frames.pressure_kpa[~frames.rest]
+    return model.carried(true) if cells else true
 
 
 def known(calibration: Path | None) -> "ArrayCalibration | None":

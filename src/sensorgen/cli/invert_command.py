@@ -8,9 +8,8 @@ import click
 import numpy as np
 
 from sensorgen.cli import inversion, render
-from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import of_word
-from sensorgen.cli.designs import DesignGroup
+from sensorgen.cli.designs import BodyChoice, DesignGroup
 from sensorgen.cli.inversion import Task
 from sensorgen.cli.options import ArrayFrames, Law, LogFile
 from sensorgen.core import lazy as registry
@@ -120,8 +119,8 @@ class _Perfect:
         from sensorgen.prediction.inverse import answers
         from sensorgen.prediction.inverse.estimator import Estimator
         from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
-        from sensorgen.prediction.planning import sensor_model
         from sensorgen.prediction.query import NOISE
+        from sensorgen.prediction.sensor_model import sensor_model
 
         model = sensor_model(body, query)[0]
         noise = NOISE if task.noise is None else task.noise
@@ -196,11 +195,10 @@ def _of_design(
 
     def inverter(rest: Any, tones_hz: Any, noise: Any) -> _Made:
         from sensorgen.prediction.calibration import fitting
-        from sensorgen.prediction.calibration.bench import Bench, spread_of
         from sensorgen.prediction.calibration.inversion import Inverter
-        from sensorgen.prediction.calibration.specimen import SpecimenModel
+        from sensorgen.prediction.calibration.specimen import Bench, SpecimenModel, spread_of
         from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
-        from sensorgen.prediction.planning import sensor_model
+        from sensorgen.prediction.sensor_model import sensor_model
 
         predicted, _ = sensor_model(printed, query)
         model = SpecimenModel(predicted.sensor, tones_hz, spread_of(predicted, Bench()))

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import click
 
 from sensorgen.cli import FOUND_ERRORS, render
+from sensorgen.cli.commands import NumberRange, pairs
 from sensorgen.cli.commands import command as of_function
 from sensorgen.cli.designs import of_design
 from sensorgen.cli.options import ColumnNames, LogFile
-from sensorgen.cli.words import NumberRange, pairs
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.options import Argument, Option
 

@@ -10,7 +10,7 @@ import click
 from click.core import ParameterSource
 
 from sensorgen.cli import render
-from sensorgen.cli.words import NumberRange, pairs
+from sensorgen.cli.commands import NumberRange, pairs
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sensorgen.cli import WRONG_INPUT, options, render
-from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import ended
-from sensorgen.cli.designs import of_design
+from sensorgen.cli.designs import BodyChoice, of_design
 from sensorgen.cli.options import Explain, NoCache, Sides, Sweeping
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput

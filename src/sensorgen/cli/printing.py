@@ -1,15 +1,15 @@
-"""``sensorgen check|build|slice|optimise``: whether to print a design, files that its print needs, better designs."""
+"""``sensorgen check|build|slice|batch|optimise``: whether to print a design, files of its print, better designs."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, body_options, render, unread
-from sensorgen.cli.body_options import Compensate
+from sensorgen.cli import FOUND_ERRORS, render, unread
+from sensorgen.cli.commands import FirstWord
 from sensorgen.cli.commands import command as of_function
-from sensorgen.cli.designs import of_design
-from sensorgen.cli.options import Advising, Cluster, DesignTip, Jobs, NoCache, Out, Strict, TimeLimit
+from sensorgen.cli.designs import Compensate, compensated, of_design
+from sensorgen.cli.options import Advising, Cluster, DesignTip, Jobs, LogFile, NoCache, Out, Strict, TimeLimit
 from sensorgen.core.errors import Unprintable
 from sensorgen.core.options import Option
 from sensorgen.design.walls import rule
@@ -107,9 +107,9 @@ def build_command(
     from sensorgen.workflows.build import STEPS, Built, DetailedBuild, build
 
     if verify:
-        return _verify(design, out / design.name)
+        return _verify_build(design, out / design.name)
     asked = design
-    design, changes = body_options.compensated(design, compensate, design.walls)
+    design, changes = compensated(design, compensate, design.walls)
     kind, budget_s = DetailedBuild if details else Built, advising.budget if advise or advising.apply else None
 
     try:
@@ -143,7 +143,7 @@ def _refuse(design: "Design", error: Unprintable, budget_s: float | None, advisi
     return FOUND_ERRORS  # of the design as it was: the file has another one now
 
 
-def _verify(design: "Design", folder: Path) -> int:
+def _verify_build(design: "Design", folder: Path) -> int:
     from sensorgen.cli.options import LogFile
     from sensorgen.workflows.sealed import build_differences
 
@@ -179,7 +179,7 @@ def slice_command(
     from sensorgen.workflows.slice import slice_design
 
     walls = rule(slicer, design.walls)
-    design, changes = body_options.compensated(design, compensate, walls, slicer, program)
+    design, changes = compensated(design, compensate, walls, slicer, program)
     with render.refused(design.name), render.progress(("checks", *STEPS)) as step:
         gcode = slice_design(
             design, out, slicer, program=program, time_limit_s=time_limit_s, force=force, strict=strict,
@@ -225,3 +225,79 @@ def optimise_command(
         )  # fmt: skip
     render.deliver(designs)
     return render.verdict(*(() if designs.front else ("no design meets the target",)))
+
+
+PlateJobs = Annotated[int, Option(kind=click.IntRange(1, 64), typed="")]
+
+
+def _plan(
+    name: str, *, out: Out = Path("out"), no_gcode: bool = False, time_limit_s: TimeLimit = TIME_LIMIT_S,
+    force: bool = False, strict: Strict = False, jobs: PlateJobs = 1, cluster: Cluster = "",
+) -> int:  # fmt: skip
+    """Write all files of a plan's plate.
+
+    Parameters
+    ----------
+    out
+        Folder for batches' folders.
+    no_gcode
+        Leave out slicing, which takes most of the time.
+    force
+        Write the files even if checks report errors.
+    jobs : N
+        Processes at once; one if not given.
+    """
+    from sensorgen.workflows.batch import STEPS, make
+
+    with LogFile().existing() as log:
+        head = log.head()[1] if log else ""
+    with render.refused(Path(name).stem), render.progress(STEPS) as step:
+        batch = make(
+            Path(name), out, gcode=not no_gcode, time_limit_s=time_limit_s, force=force, strict=strict,
+            log_head=head, jobs=jobs, cluster=cluster, step=step,
+        )  # fmt: skip
+    render.deliver(batch)
+    return FOUND_ERRORS if batch.errors(force=force) else 0
+
+
+batch_command = FirstWord(
+    "batch",
+    _plan,
+    *render.options(folder=True),
+    thing="plan",
+    form="PLAN.yaml {option} ...",
+    subcommand_metavar="{PLAN.yaml|verify} [OPTIONS]",
+    help="""Put several sensors on one plate: 3MF, G-code, labels, and a record of what lies where.
+
+    \b
+    sensorgen batch plan.yaml            all files of the plan's plate
+    sensorgen batch verify out/NAME      are they still what was written?
+
+    docs/batch.md has an example of a plan.
+    """,
+    epilog="PLAN.yaml --help lists the options.",
+)
+
+
+@of_function(
+    "verify",
+    *render.options("json", "markdown"),
+    group=batch_command,
+    short="Hash every file again and say what differs.",
+)
+def _verify_batch(folder: Path, log: LogFile) -> int:
+    """Hash every file of a batch's folder again, and say what differs from its record; exit code 1 if anything does.
+
+    The record itself is compared with the log, if that has the batch.
+
+    Parameters
+    ----------
+    folder
+    """
+    from sensorgen.workflows.batch.record import RECORD
+    from sensorgen.workflows.sealed import batch_differences
+
+    with log.existing() as rows:
+        differences = batch_differences(folder, RECORD, rows)
+    render.deliver(differences)
+    return FOUND_ERRORS if differences else 0

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from sensorgen.cli import render
-from sensorgen.cli.body_options import BodyChoice
-from sensorgen.cli.designs import of_design
+from sensorgen.cli.designs import BodyChoice, of_design
 from sensorgen.cli.options import Force, InputResistance, Law, Readout, refuse_input
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
@@ -78,7 +77,7 @@ def sheet_command(
     plot : DIR
         Write maps of the bounds there.
     """
-    from sensorgen.prediction.planning import sensor_model
+    from sensorgen.prediction.sensor_model import sensor_model
     from sensorgen.prediction.sheet_study import PLACES, study
 
     model = sensor_model(body(design), Query(law=law))[0]

@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sensorgen.cli import FOUND_ERRORS, render
-from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import command as of_function
-from sensorgen.cli.designs import of_design
+from sensorgen.cli.designs import BodyChoice, of_design
 from sensorgen.cli.options import Out
 from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option, Without
@@ -54,7 +53,7 @@ def import_command(
     force
         Replace a design of that name.
     """
-    from sensorgen.workflows.importing import assigning, reading, writing
+    from sensorgen.workflows.importing import reading, writing
 
     if not 1e-4 <= chord <= 1.0:
         raise BadInput(f"--chord {chord:g}: expected 0.0001 to 1 mm")
@@ -62,7 +61,7 @@ def import_command(
     name = name or files[0].stem
     if only_list or assembly.errors or not maps:
         return _listed(assembly, out, None if only_list else out / f"{name}-faults.svg")
-    bodies = assigning.assign(assembly, maps, terminals, out)
+    bodies = writing.assign(assembly, maps, terminals, out)
     more = dict(word for word in (("printer", printer), ("quality", quality)) if word[1])
     design = writing.write(assembly, bodies, name=name, folder=out, more=more, replace_existing=force)
     render.deliver(design)
@@ -72,9 +71,9 @@ def import_command(
 def _listed(assembly: Any, folder: Path, drawing: Path | None) -> int:
     """List bodies that are not imported, and raise the reason unless a list is all that was asked for."""
     from sensorgen.core import files
-    from sensorgen.workflows.importing import assigning, reading
+    from sensorgen.workflows.importing import reading, writing
 
-    listed = assigning.BodyListing.of(assembly, folder)
+    listed = writing.BodyListing.of(assembly, folder)
     render.deliver(listed)
     if assembly.errors:
         first, where = assembly.errors[0], "nothing is imported"

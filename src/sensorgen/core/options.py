@@ -20,8 +20,8 @@ class Option:
     flags : tuple of str
         As ``("--output", "-o")``; made of the parameter's name if not given.
     kind : Quantity, tuple of str, str, or click type; or None
-        A quantity with its unit, one of some names, a kind of ``sensorgen.cli.words.KINDS`` as "share", or any type of
-        click; that of the annotation if None.
+        A quantity with its unit, one of some names, a kind of ``sensorgen.cli.commands.KINDS`` as "share", or any type
+        of click; that of the annotation if None.
     typed : str or None
         Default as it would be typed and as the help shows it, in place of the parameter's.
     metavar : str or None

@@ -312,13 +312,7 @@ def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> st
     except ValueError:
         return ""
     if others:
-        parts = [(body, p) for body in piece.scene.bodies for p in body.pieces]
-        if turned or not all(p.is_box() for _, p in parts):
-            return ""
-        spans = sorted(
-            (b.material, b.terminal, [[round(v, digits) for v in p.span(n)] for n in "xyz"]) for b, p in parts
-        )
-        return _hashed([spans, piece.period_mm])
+        return "" if turned else _boxes_content(piece, digits)
     outlines = [outline for _, outline in section.regions]
     if turned:
         outlines = _mirrored(outlines)
@@ -327,6 +321,15 @@ def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> st
         for (body, _), outline in zip(section.regions, outlines, strict=True)
     )
     return _hashed([regions, piece.period_mm])
+
+
+def _boxes_content(piece: PressedPiece, digits: int) -> str:
+    """Identity of a cell of boxes; "" where another body is in it."""
+    parts = [(body, p) for body in piece.scene.bodies for p in body.pieces]
+    if not all(p.is_box() for _, p in parts):
+        return ""
+    spans = sorted((b.material, b.terminal, [[round(v, digits) for v in p.span(n)] for n in "xyz"]) for b, p in parts)
+    return _hashed([spans, piece.period_mm])
 
 
 def _hashed(values: list[object]) -> str:
@@ -582,6 +585,14 @@ def under_tops(
     return curves
 
 
+def _few_pa(stress_pa: float, tip: Tip) -> Real:
+    """A few pressures up to beyond one, where it is among those of :func:`under_tops` these [Pa]."""
+    last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
+    usual = stresses_pa(stress_pa)[-1] * np.array(_COARSE)
+    is_usual = stress_pa <= last_pa and not tip.soft and stress_pa in usual
+    return usual if is_usual else last_pa * np.array([0.0, 0.4, 0.8, 1.0])
+
+
 def at_a_few_pressures(
     design: Design, printed: PressedPiece, answer: Answer, stress_pa: float, name: str = "", *, tip: Tip = FLAT,
     level: int = COARSEST,
@@ -619,13 +630,9 @@ def at_a_few_pressures(
     if model == "press3d":
         law = infill(design, printed) or nearest(design, printed, answer, stress_pa)
         return law if law.bounded else None
-    last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
-    loads, usual = last_pa * np.array([0.0, 0.4, 0.8, 1.0]), stresses_pa(stress_pa)[-1] * np.array(_COARSE)
-    if stress_pa <= last_pa and not tip.soft and stress_pa in usual:
-        loads = usual
     try:
         case = case_of(design, printed, model, tip)
-        solution = pressed(case, loads.tolist(), level)
+        solution = pressed(case, _few_pa(stress_pa, tip).tolist(), level)
         curve = curve_of(solution)
     except SensorgenError:
         return None

@@ -17,8 +17,8 @@ from sensorgen.design.values import MaterialValue, material_value
 from sensorgen.models.sensor import Sensor
 from sensorgen.models.stack import Film, GroundTie, Press, Stack, StackResponse, Touch, Track, port, standard_errors
 from sensorgen.prediction import bodies
-from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import TIP_M, Query, Tip
+from sensorgen.prediction.sensor_model import sensor_model
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def stacked(
     Raises
     ------
     SensorgenError
-        As :func:`sensorgen.prediction.planning.sensor_model`.
+        As :func:`sensorgen.prediction.sensor_model.sensor_model`.
     """
     models = [sensor_model(body(half), Query(tip=Tip(tip_m), law=law))[0] for half in halves(design)]
     lower, upper = models[0], models[-1]
@@ -407,7 +407,13 @@ class StackStudy:
             f"{self.force_n:g} N at {self.position_m / M_PER_MM:g} mm, noise {self.noise * 100:g} %; "
             f"it moves a reading by {self.press_shift * 100:.3g} %"
         )
+        yield from ("", self._readings(), "", self._errors(), "", self._touches())
+        yield f"needed: isolation from which on it stays within {self.within_n:g} N"
         yield ""
+        yield from (f"doubt: {doubt}" for doubt in self.doubts)
+        yield f"assumptions: {'; '.join(self.assumptions)}"
+
+    def _readings(self) -> Table:
         heads = ("lower R", "lower X", "upper R", "upper X", "delta R", "delta X")
         readings = (
             (r.frequency_hz, r.lower_re, r.lower_im, r.upper_re, r.upper_im, r.upper_re - r.lower_re,
@@ -416,8 +422,9 @@ class StackStudy:
         )  # fmt: skip
         columns = (Column("frequency", "Hz", si=True), *(Column(head) for head in heads))
         caption = "two films that share the middle electrode; R and X, and upper - lower [ohm]"
-        yield Table("readings", caption, columns, tuple(readings))
-        yield ""
+        return Table("readings", caption, columns, tuple(readings))
+
+    def _errors(self) -> Table:
         columns = (
             Column("reading"), Column("sigma F", "N", si=True), Column("sigma x", "m", si=True),
             Column("with drift, F", "N", si=True), Column("x", "m", si=True),
@@ -427,8 +434,9 @@ class StackStudy:
             for e in self.bounds
         )
         caption = f"standard errors, permittivity known, and where it may drift by {self.drift * 100:g} %"
-        yield Table("errors", caption, columns, tuple(errors))
-        yield ""
+        return Table("errors", caption, columns, tuple(errors))
+
+    def _touches(self) -> Table:
         effects = (
             (f"{rows[0].isolation_mm:.4g} mm" if rows[0].isolation_mm else "bare",
              *(f"{r.largest_shift * 100:.2g} % {r.mistaken_for_n:.3g} N" for r in rows))
@@ -439,11 +447,7 @@ class StackStudy:
             "A body that touches the top beside the press: shift of the reading, and the force that it is mistaken for"
         )
         columns = (Column("isolation"), *(Column(row.wiring) for row in self.touch))
-        yield Table("touch", caption, columns, (*effects, needed))
-        yield f"needed: isolation from which on it stays within {self.within_n:g} N"
-        yield ""
-        yield from (f"doubt: {doubt}" for doubt in self.doubts)
-        yield f"assumptions: {'; '.join(self.assumptions)}"
+        return Table("touch", caption, columns, (*effects, needed))
 
 
 def _needed(thickness_mm: float | None) -> str:

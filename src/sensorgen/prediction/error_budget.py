@@ -4,28 +4,40 @@ Terms of the models are ``cell`` (bounds of the capacitance), ``compression`` (e
 and contact conditions of the cell), ``line`` (sections under the tip) and ``tip`` (profile of its pressure);
 ``slicer's walls`` is what slicers and line widths differ by, ``film thickness`` what the heights of two tools do,
 ``film a layer thinner`` a fault. Then come material values on which sources disagree, what leads, contacts and the
-edge may add, and what a reading is exposed to (:mod:`sensorgen.prediction.exposure`).
+edge may add, and what a reading is exposed to beside the press: the design's ``effects``.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from itertools import chain
+from math import radians, tan
+from typing import Any, Literal, NamedTuple
 
+import numpy as np
+import shapely
+
+from sensorgen.checks import estimate, volumes
+from sensorgen.checks.review import review
+from sensorgen.core.arrays import Real
+from sensorgen.core.errors import MissingValue, OutOfRange
+from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.design.effects import GUESS
+from sensorgen.design.effects import GUESS, Effects
 from sensorgen.design.materials import PIEZORESISTANCE
-from sensorgen.design.tip import TOPS
+from sensorgen.design.tip import EVEN, TOPS
 from sensorgen.design.values import ENDS, MaterialValue, material_value, piezoresistance, resistivities, spread
+from sensorgen.design.walls import rule, rules
+from sensorgen.models import pressure
+from sensorgen.models.compression import averaged, beyond
 from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
-from sensorgen.prediction.compression_law import CLOSED_FORM
-from sensorgen.prediction.exposure import exposed
-from sensorgen.prediction.print_faults import CHANGE, by_walls
+from sensorgen.prediction.compression_law import CLOSED_FORM, Law, gap_m
 from sensorgen.prediction.query import NOISE, Load
-from sensorgen.prediction.reference_load import ReferenceLoad
+from sensorgen.prediction.reference_load import Dispersed, ReferenceLoad
 from sensorgen.prediction.rest_state import added, permittivity_ratios
 from sensorgen.prediction.results import Changes, ErrorBudget, Term
-from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.prediction.sensor_model import SensorModel, piece
+from sensorgen.scene.layers import drawn, united
 from sensorgen.scene.scene import Scene
 
 _NEAR = 1.01  # ratio of moduli that are not told apart
@@ -89,19 +101,8 @@ def _models(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
     yield reference.term(
         "cell", f"capacitance between its bounds ({model.rest.answer.model})", "model", ends, source=_MODEL
     )
-    why = "error of the law" if law.bounded else "law of a solid plate (B.49) on a cell with gaps: error unknown"
-    if law.others and law.others[0].name != law.compression.name:
-        why = f"{law.compression.name} or {law.others[0].name}"
-    if law.bounded:
-        others = [replace(sensor, compression=o) for o in law.others]
-        yield reference.term("compression", why, "model", others, source=_MODEL)
-    else:
-        yield Term("compression", why, "model", None, source=_MODEL)
-    tops = [replace(sensor, compression=o) for o in (*law.tops.values(), *law.other_boundaries)]
-    solid = not tops and law.bounded and law.compression.name in CLOSED_FORM
-    more = ", faces that stick, or a cell free to widen" if law.other_boundaries else ": layers take both alike" * solid
-    what, at_least = f"even pressure or a stiff plate on the top{more}", not solid and len(law.tops) < len(TOPS)
-    yield reference.term("boundary", what, "model", tops, at_least=at_least, source=_MODEL)
+    yield _law_error(sensor, law, reference)
+    yield _boundary(sensor, law, reference)
     if sensor.profile == UNIFORM:
         yield reference.term("line", "one section under the tip is exact", "model", [sensor], source=_MODEL)
     else:
@@ -111,6 +112,26 @@ def _models(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
     profiles = [replace(sensor, profile=name) for name in PROFILES if name != sensor.profile]
     what = f"pressure distributed like {', '.join(s.profile for s in profiles)}"
     yield reference.term("tip", what, "model", profiles, source=_MODEL)
+
+
+def _law_error(sensor: Sensor, law: Law, reference: ReferenceLoad) -> Term:
+    """Error of the law of compression itself."""
+    why = "error of the law" if law.bounded else "law of a solid plate (B.49) on a cell with gaps: error unknown"
+    if law.others and law.others[0].name != law.compression.name:
+        why = f"{law.compression.name} or {law.others[0].name}"
+    if not law.bounded:
+        return Term("compression", why, "model", None, source=_MODEL)
+    others = [replace(sensor, compression=o) for o in law.others]
+    return reference.term("compression", why, "model", others, source=_MODEL)
+
+
+def _boundary(sensor: Sensor, law: Law, reference: ReferenceLoad) -> Term:
+    """Other boundary conditions: of the top of the cell, of faces in contact, and of its sides."""
+    tops = [replace(sensor, compression=o) for o in (*law.tops.values(), *law.other_boundaries)]
+    solid = not tops and law.bounded and law.compression.name in CLOSED_FORM
+    more = ", faces that stick, or a cell free to widen" if law.other_boundaries else ": layers take both alike" * solid
+    what, at_least = f"even pressure or a stiff plate on the top{more}", not solid and len(law.tops) < len(TOPS)
+    return reference.term("boundary", what, "model", tops, at_least=at_least, source=_MODEL)
 
 
 def _print(
@@ -171,16 +192,7 @@ class Ends(NamedTuple):
 def material_ends(model: SensorModel, reference: ReferenceLoad) -> Iterator[Ends]:
     """Uncertain values of materials and leads, of a sensor under the load of the reference."""
     design, sensor = model.body.design, model.sensor
-    tracks = [spread(design, value) for value in resistivities(design).values()]
-    if any(low < high for low, high in tracks):
-        ends = [replace(sensor, resistivity_ohm_m=(a, b)) for a, b in zip(*tracks, strict=True)]
-        what = f"of the electrodes, {_range_text(tracks)} ohm m"
-        yield Ends("resistivity", what, ends)
-    rises = [_piezoresistance_range(design, end) for end in ENDS]
-    if any(low < high for low, high in rises):
-        ends = [replace(sensor, piezoresistance_per_pa=(a, b)) for a, b in zip(*rises, strict=True)]
-        what = f"of the electrodes, {_range_text(rises)} 1/Pa"
-        yield Ends("piezoresistance", what, ends)
+    yield from _electrodes(design, sensor)
     yield from _stiffness(model, reference)
     for name, ratios in permittivity_ratios(design, model.body.cells.first()).items():
         value = next(v for v in model.rest.values if v.material == name and v.quantity == "relative_permittivity")
@@ -193,6 +205,18 @@ def material_ends(model: SensorModel, reference: ReferenceLoad) -> Iterator[Ends
                kind="leads")  # fmt: skip
     ends = [replace(sensor, lead_ohm=end) for end in ohm[1:]]
     yield Ends("contact resistance", f"leads and contacts, {_range_text([ohm[1:]])} ohm", ends, kind="leads")
+
+
+def _electrodes(design: Design, sensor: Sensor) -> Iterator[Ends]:
+    """Resistivity and piezoresistance of both electrodes at once, where any is uncertain."""
+    tracks = [spread(design, value) for value in resistivities(design).values()]
+    if any(low < high for low, high in tracks):
+        ends = [replace(sensor, resistivity_ohm_m=(a, b)) for a, b in zip(*tracks, strict=True)]
+        yield Ends("resistivity", f"of the electrodes, {_range_text(tracks)} ohm m", ends)
+    rises = [_piezoresistance_range(design, end) for end in ENDS]
+    if any(low < high for low, high in rises):
+        ends = [replace(sensor, piezoresistance_per_pa=(a, b)) for a, b in zip(*rises, strict=True)]
+        yield Ends("piezoresistance", f"of the electrodes, {_range_text(rises)} 1/Pa", ends)
 
 
 def _piezoresistance_range(design: Design, end: str) -> tuple[float, float]:
@@ -251,3 +275,187 @@ def _least_modulus(sensor: Sensor, softest: float, reference: ReferenceLoad) -> 
 def _range_text(ranges: Sequence[tuple[float, float]]) -> str:
     low, high = min(a for a, _ in ranges), max(b for _, b in ranges)
     return " to ".join(f"{float(f'{end:.3g}'):g}" for end in (low, high))
+
+
+_EDGE = 0.45  # of the width: farthest that a tip is pressed off the middle
+
+
+class Exposure(NamedTuple):
+    """An effect.
+
+    ``keys`` are the design's of its size, ``sensors`` those at its ends: none where it is left out, None where they
+    are not known. ``since_rest`` if it came after the last reading at rest, ``at_least`` if the law ends below it.
+    """
+
+    keys: tuple[str, ...]
+    name: str
+    what: str
+    kind: Any
+    sensors: Sequence[Sensor] | None
+    since_rest: bool = True
+    at_least: bool = False
+    turns: str = ""
+
+
+def exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
+    """Terms of what a reading depends on beside the press; none without a press."""
+    effects = model.body.design.effects
+    if not reference.force_n > 0:
+        return
+    for one in chain(_drift(effects, model.sensor), _memory(effects, reference), _tip(effects, model, reference),
+                     _first_layer(effects, model)):  # fmt: skip
+        source = effects.source(*one.keys)
+        if one.sensors is None:
+            yield Term(one.name, one.what, one.kind, None, source=source, turns=one.turns)
+        elif one.sensors:
+            yield reference.term(
+                one.name, one.what, one.kind, one.sensors, since_rest=one.since_rest, at_least=one.at_least,
+                source=source, turns=one.turns,
+            )  # fmt: skip
+    if effects.meter:
+        gain = Changes(*(effects.meter,) * 5)  # the same at rest: the press is read as it is
+        what = f"{effects.meter:.2g} of every reading"
+        yield Term("meter's gain", what, "meter", gain, source=effects.source("meter"))
+    if effects.meter_circuit:
+        circuit, what = reference.other_circuit(), "C, R and D of one circuit taken for those of the other"
+        yield Term(
+            "meter: series or parallel", what, "meter", circuit, source=effects.source("meter_circuit"),
+            turns=reference.turns(circuit),
+        )  # fmt: skip
+    if effects.person_n or effects.person_mm:
+        press = Changes(force_n=effects.person_n, position_m=effects.person_mm * M_PER_MM)
+        what = f"press noted {effects.person_n:g} N and {effects.person_mm:g} mm off"
+        source = effects.source("person_n", "person_mm")
+        yield Term("person", what, "person", press, source=source, turns=reference.turns(press))
+
+
+def _drift(e: Effects, sensor: Sensor) -> Iterator[Exposure]:
+    """Drift of permittivity and resistivity since the reading at rest, and their dispersion."""
+    causes = ("temperature", "k", "K"), ("humidity", "percent", "% of humidity")
+    for quantity, of in (("permittivity", _permittivity), ("resistivity", _resistivity)):
+        for cause, unit, words in causes:
+            keys = f"{quantity}_per_{unit}", f"{cause}_{unit}"
+            per, change = (getattr(e, key) for key in keys)
+            ends = [of(sensor, 1 + sign * per * change) for sign in (-1, 1) if per * change]
+            what = f"{per * change:.2g} by {change:g} {words} since the reading at rest"
+            yield Exposure(keys, f"{quantity}, {cause}", what, "drift", ends)
+    n, m = e.permittivity_dispersion, e.resistivity_dispersion
+    dispersed = [Dispersed(**vars(sensor), permittivity_power=n, resistivity_power=m)] if n or m else []
+    what = f"permittivity as f^-{n:g}, resistivity as f^-{m:g}"
+    yield Exposure(
+        ("permittivity_dispersion", "resistivity_dispersion"), "dispersion", what, "drift", dispersed, since_rest=False
+    )
+
+
+def _memory(e: Effects, reference: ReferenceLoad) -> Iterator[Exposure]:
+    """Memory of the film: of a higher load, and of the time under this one."""
+    for name, share, when in (
+        ("hysteresis", e.hysteresis, "after a higher load"), ("creep", e.creep, "under a load that lasts"),
+    ):  # fmt: skip
+        ends = _with_law(reference, lambda _: np.ones(1), 1 + share) if share else []
+        yield Exposure((name,), name, f"rise of C {share:.2g} larger {when}", "drift", ends)
+
+
+def _tip(e: Effects, model: SensorModel, reference: ReferenceLoad) -> Iterator[Exposure]:
+    """Piezoresistance under the tip; uneven pressure across the sensor: a tip off the middle, or tilted."""
+    width_m = model.sensor.width_m
+    if not model.piezoresistance:
+        per_pa = e.piezoresistance / reference.stress_pa()
+        changed = [replace(model.sensor, piezoresistance_per_pa=(s * per_pa, s * per_pa)) for s in (-1, 1) if per_pa]
+        what = f"resistivity under the tip {e.piezoresistance:g} lower or higher"
+        yield Exposure(("piezoresistance",), "piezoresistance", what, "drift", changed)
+    if e.off_middle_mm:
+        across = pressure.off_middle(min(e.off_middle_mm * M_PER_MM / width_m, _EDGE))
+        ends = _with_law(reference, lambda _: across)
+        yield Exposure(("off_middle_mm",), "tip off the middle", f"by {e.off_middle_mm:g} mm across", "tip", ends)
+    if e.tilt_deg and model.body.design.tip.block != EVEN:
+        ends = _tilted(model, reference, tan(radians(e.tilt_deg)) * width_m)
+        ended = len(ends or ()) > 1
+        what = f"by {e.tilt_deg:g} degrees across{': its edge presses beyond the compression law' * ended}"
+        yield Exposure(("tilt_deg",), "tip tilted", what, "tip", ends, at_least=ended)
+
+
+def _first_layer(e: Effects, model: SensorModel) -> Iterator[Exposure]:
+    """A bottom electrode thinner than drawn: its first layer squeezed, or the bed uneven."""
+    top, bottom = model.sensor.electrode_m
+    for key, least_mm, name in (
+        ("squeezed_mm", e.squeezed_mm, "first layer squeezed"), ("bed_mm", e.bed_mm, "bed uneven"),
+    ):  # fmt: skip
+        thinner = bottom - least_mm * M_PER_MM
+        ends = None if thinner <= 0 else [replace(model.sensor, electrode_m=(top, thinner))] if least_mm else []
+        what = f"by {least_mm:g} mm: bottom electrode thinner"
+        turns = by_first_layer(model.body.design, least_mm) if least_mm else ""
+        yield Exposure((key,), name, what, "print", ends, since_rest=False, turns=turns)
+
+
+def _permittivity(sensor: Sensor, factor: float) -> Sensor:
+    return replace(sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * factor)
+
+
+def _resistivity(sensor: Sensor, factor: float) -> Sensor:
+    top, bottom = sensor.resistivity_ohm_m
+    return replace(sensor, resistivity_ohm_m=(top * factor, bottom * factor))
+
+
+def _with_law(
+    reference: ReferenceLoad, shares: Callable[[float], Real], scale: float = 1.0
+) -> list[Sensor] | None:  # fmt: skip
+    """The sensor with the rise of its parts at uneven pressures, times a scale; None beyond the law of a plate.
+
+    Beyond the law of a cell, whose gaps close: with no further rise, and with one by its last slope.
+    """
+    sensor, mean_pa = reference.sensor, reference.stress_pa()
+    try:
+        laws = [averaged(law, shares, mean_pa) for law in beyond(sensor.compression, mean_pa, shares)]
+    except OutOfRange:
+        return None
+    return [replace(sensor, compression=law.scaled_rise(scale)) for law in laws]
+
+
+def _tilted(model: SensorModel, reference: ReferenceLoad, difference_m: float) -> list[Sensor] | None:
+    """Under a tip that is held so many metres lower at one side; None where it is not known how the film yields."""
+    design, tip = model.body.design, model.body.design.tip.tip()
+    block = tip.height_m / design.material(tip.block).value("youngs_modulus_pa").value if tip.soft else 0.0
+    try:
+        film_pa_per_m = model.sensor.compression.foundation_stiffness_pa_per_m(gap_m(piece(model.body).scene))
+    except (MissingValue, OutOfRange):
+        return None
+    rise_pa = difference_m / (1 / film_pa_per_m + block)
+    return _with_law(reference, lambda mean_pa: pressure.tilted(rise_pa, mean_pa))
+
+
+CHANGE, PRINT = "CHANGE", "PRINT"
+
+
+def by_walls(design: Design) -> str:
+    """Verdict with the walls of other slicers: CHANGE where they lose a body, PRINT where these alone do; else ""."""
+    own, others = rule("prusa", design.walls), rules(design.profile.walls)
+    lost = {walls: _loses(design, walls) for walls in dict.fromkeys((own, *others))}
+    if not lost[own]:
+        return CHANGE if any(lost.values()) else ""
+    return PRINT if any(not lost[w] and review(design, walls=w).verdict != CHANGE for w in lost) else ""
+
+
+def _loses(design: Design, walls: str) -> bool:
+    """Test whether a body is not printed at all in some layer, which the design does not waive."""
+    scene = design.printed
+    layers = estimate.layers(scene, design.machine, design.layers, walls, estimate.lines(design))
+    found = design.waived(volumes.findings(volumes.rows(scene, layers), scene))
+    return any(f.severity == "error" and not f.waiver for f in found)
+
+
+def by_first_layer(design: Design, thinner_mm: float) -> str:
+    """Verdict with a first layer thinner by a length [mm]: CHANGE where none is left, or electrodes in it touch.
+
+    A line keeps its area, so that its sides move out by w t / (2 (h - t)); within an electrode they have no room.
+    """
+    scene, quality = design.printed, design.layers
+    first = drawn(scene, quality.boundaries_mm(scene.size_mm[2]))[0]
+    left_mm = first.height_mm - thinner_mm
+    if left_mm <= 0:
+        return CHANGE
+    aside_mm = design.machine.line_mm() * thinner_mm / (2 * left_mm)
+    ends = {b.terminal: [first.region(c.name) for c in scene.bodies if c.terminal == b.terminal] for b in scene.bodies}
+    spread = [shapely.buffer(united(parts), aside_mm) for terminal, parts in ends.items() if terminal]
+    area_mm2 = sum(region.area for region in spread) - shapely.union_all(spread).area
+    return CHANGE if area_mm2 > 1e-9 else ""

@@ -21,10 +21,9 @@ from sensorgen.design.design import Design
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
-from sensorgen.prediction.planning import rough_sensor, sensor_model
 from sensorgen.prediction.query import Load, Query
 from sensorgen.prediction.results import Prediction, timeless
-from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.prediction.sensor_model import SensorModel, rough_sensor, sensor_model
 from sensorgen.prediction.sweep import Sweeper
 
 LARGEST = 2_000_000  # impedances that are kept in memory at once

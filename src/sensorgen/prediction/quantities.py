@@ -27,7 +27,6 @@ from sensorgen.prediction.error_budget import error_budget, material_ends, modul
 from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.identify import identify
 from sensorgen.prediction.plan import Plan
-from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import FORCE_N, Load, Query
 from sensorgen.prediction.reference_load import ReferenceLoad
 from sensorgen.prediction.rest_state import (
@@ -42,7 +41,7 @@ from sensorgen.prediction.rest_state import (
     rest_state,
 )
 from sensorgen.prediction.results import SCHEMA, Impedance, Narrowing, Prediction, UnderTop
-from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
+from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece, sensor_model
 from sensorgen.scene.slabs import is_open
 
 WIDE = 3.0  # upper over lower end, from which on a measurement is advised

@@ -428,14 +428,8 @@ class Prediction(Displayed):
     def summary(self) -> Iterator[Part]:
         """Quantities of the print beside the drawing's: the best value and the range with all errors."""
         shown = [self.drawn, self] if self.drawn else [self]
-        rows = [
-            ("electrode gap", *(_words(p.gap) for p in shown)),
-            ("capacitance", *(p.capacitance.words() if p.capacitance else p.status for p in shown)),
-            *((f"{end} electrode", *(_words(p.resistance.get(end)) for p in shown)) for end in self.resistance),
-            ("sensitivity [1/kPa]", *((_words(p.sensitivity) or "–").replace(" 1/kPa", "") for p in shown)),
-            ("force resolution", *(p.resolved()[0] for p in shown)),
-            ("position resolution", *(p.resolved()[1] for p in shown)),
-        ]
+        words = [p._words_of_quantities() for p in shown]
+        rows = [(name, *(each.get(name) for each in words)) for name in words[-1]]
         columns = (Column(""), *(Column(p.body.partition(",")[0]) for p in shown))
         yield Table("quantities", "", columns, tuple(rows))
         yield caption_of(self.force_n, self.position_m, self.body)
@@ -445,6 +439,17 @@ class Prediction(Displayed):
             columns = (Column("range that spans"), Column("a factor"), Column("narrowed most by"), Column("to"))
             rows_ = ((n.quantity, _times(n.factor), n.measurement, _times(n.left)) for n in self.narrowing)
             yield Table("narrowing", "", columns, tuple(rows_))
+
+    def _words_of_quantities(self) -> dict[str, str | None]:
+        """Quantities of the summary in words, by name."""
+        force, position = self.resolved()
+        return {
+            "electrode gap": _words(self.gap),
+            "capacitance": self.capacitance.words() if self.capacitance else self.status,
+            **{f"{end} electrode": _words(bounds) for end, bounds in self.resistance.items()},
+            "sensitivity [1/kPa]": (_words(self.sensitivity) or "–").replace(" 1/kPa", ""),
+            "force resolution": force, "position resolution": position,
+        }  # fmt: skip
 
     def quantities(self) -> dict[str, Bounds | None]:
         """Quantities of the summary by name; resolutions as on a bench."""

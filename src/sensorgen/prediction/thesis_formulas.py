@@ -142,13 +142,15 @@ def sweep(
         cases = [(value, design, pressed) for value, design in points]
     else:
         cases = [(press, points[0][1], press) for press in press_mm]
-    results = []
-    for _, design, press in cases:
-        try:
-            results.append(answer(design, asked, press))
-        except OutOfRange as error:
-            results.append(FormulaResult(design=design.name, reason=str(error), press_mm=press))
-    return Sweep(key or "press_mm", tuple(value for value, *_ in cases), tuple(results))
+    results = tuple(_answer_or_reason(design, asked, press) for _, design, press in cases)
+    return Sweep(key or "press_mm", tuple(value for value, *_ in cases), results)
+
+
+def _answer_or_reason(design: Design, asked: CapacitanceQuestion, press_mm: float | None) -> FormulaResult:
+    try:
+        return answer(design, asked, press_mm)
+    except OutOfRange as error:
+        return FormulaResult(design=design.name, reason=str(error), press_mm=press_mm)
 
 
 def _refuse(design: Design, name: str, press_mm: float | None) -> None:

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import click
 
 from sensorgen.cli import render
-from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import arguments, options_of
-from sensorgen.cli.designs import DesignGroup
+from sensorgen.cli.designs import BodyChoice, DesignGroup
 from sensorgen.core.display import escaped
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.options import Option

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from sensorgen.analysis import calibration as calibrations
 from sensorgen.analysis.calibration import Bench
 from sensorgen.analysis.comparison import Comparison, of_iteration
-from sensorgen.analysis.fit import Fit
 from sensorgen.analysis.fit import fit as fit_values
+from sensorgen.analysis.fit.estimates import Fit
 from sensorgen.checks.review import Review
 from sensorgen.core import files
 from sensorgen.core.errors import BadInput
@@ -27,9 +27,9 @@ from sensorgen.prediction.calibration.calibration import Calibration
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
 from sensorgen.prediction.loaded import Loaded, PredictedPoint, loaded
 from sensorgen.prediction.loaded import sweep as predicted_sweep
-from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import DEFAULT, NOISE, TONES_HZ, Query, Tip
 from sensorgen.prediction.results import Prediction
+from sensorgen.prediction.sensor_model import sensor_model
 from sensorgen.prediction.slices import reviewed
 from sensorgen.prediction.sweep import Sweep
 from sensorgen.solvers.contact.boundary import BoundaryConditions
@@ -40,7 +40,7 @@ from sensorgen.workflows.build import Built
 from sensorgen.workflows.slice import SlicedFile
 
 if TYPE_CHECKING:
-    from sensorgen.analysis.report.contents import Report
+    from sensorgen.analysis.report import Report
     from sensorgen.workflows.batch import Batch
     from sensorgen.workflows.characterise import Planned
     from sensorgen.workflows.optimise.result import Optimised
@@ -353,14 +353,14 @@ def optimise(target: str | Path, out: str | Path = "out") -> "Optimised":
 def report(log: Log, iteration: int | None = None, *specimens: str, path: str | Path = "report.html") -> "Report":
     """Write predictions beside measurements of an iteration, or of specimens, as a page; ``.md``, ``.csv``, ``.json``.
 
-    Errors as of :func:`sensorgen.analysis.report.contents.report`.
+    Errors as of :func:`sensorgen.analysis.report.report`.
     """
-    from sensorgen.analysis.report import contents, pieces
+    from sensorgen.analysis import report as reports
 
     file = Path(path)
-    compared = contents.report(log, iteration, specimens=specimens)
+    compared = reports.report(log, iteration, specimens=specimens)
     with files.replacing(file) as target:
-        target.writelines(piece.encode() for piece in pieces(compared, file.suffix.lstrip(".") or "html"))
+        target.writelines(piece.encode() for piece in reports.pieces(compared, file.suffix.lstrip(".") or "html"))
     return compared
 
 

@@ -20,8 +20,7 @@ from sensorgen.design.printer import load_quality, quality_names
 from sensorgen.prediction import bodies
 from sensorgen.scene.scene import SLIVER_MM
 from sensorgen.workflows import moves
-from sensorgen.workflows.moves import Key
-from sensorgen.workflows.search import Candidate, Nearest
+from sensorgen.workflows.moves import Candidate, Key, Nearest
 
 BAKE = 0.2  # what the bake takes off in the plane (thesis 6.2)
 FILM_LAYERS = 2  # of a film at least: through one layer leads every slit between two lines
@@ -231,6 +230,11 @@ def of_body(body: Body, *, stiffness: bool = False) -> Quantities:
     return one | {STIFFNESS: law.compression.foundation_stiffness_pa_per_m(gap_m(cells.first())) * 1e-6}
 
 
+def _has_whole_periods(one: Candidate) -> bool:
+    """Test whether a design was cut to whole periods, of which there are few: no finer steps."""
+    return one.before is not None and bool(one.before.discarded)
+
+
 class CompensationSearch(Nearest):
     """The nearest change whose print is the wanted one: heights in whole layers, and one width or the period.
 
@@ -299,7 +303,6 @@ class CompensationSearch(Nearest):
     def take(self, one: Candidate, answer: Quantities) -> Iterable[Candidate]:
         """Go up with what is as wanted, and with the design as it was; from others on to their neighbours."""
         is_print = self.works[one.stage - 1] == self._sliced
-        is_whole = one.before and one.before.discarded  # of whole periods, of which there are few: no finer steps
         if one.discarded:
             return self._in_whole_periods(one)
         if is_print:
@@ -307,16 +310,21 @@ class CompensationSearch(Nearest):
             self._correct(one)
         else:
             self.estimates[one] = answer
-        aim, within = (self.wanted, WITHIN) if is_print or not one.values else (self.aim, ESTIMATE_WITHIN)
-        within = WITHIN if is_whole else within
-        keys = list(aim) if one.stage > 1 else [GAP, CAPACITANCE]
-        is_reached = all(abs(_off(answer, aim, key)) <= within[key] for key in keys)
+        is_reached = self._is_reached(one, answer)
         if one.stage < len(self.works) and (is_reached or not one.values):
             return [one]
         if is_reached:
             self.best = one
             return ()
-        return self._neighbours(one) if is_print or not is_whole else ()
+        return self._neighbours(one) if is_print or not _has_whole_periods(one) else ()
+
+    def _is_reached(self, one: Candidate, answer: Quantities) -> bool:
+        """Test whether a print, or the first estimate, is as wanted, others as estimates of wanted prints are."""
+        is_exact = one in self.prints or not one.values
+        aim = self.wanted if is_exact else self.aim
+        within = WITHIN if is_exact or _has_whole_periods(one) else ESTIMATE_WITHIN
+        keys = list(aim) if one.stage > 1 else [GAP, CAPACITANCE]
+        return all(abs(_off(answer, aim, key)) <= within[key] for key in keys)
 
     def _at_rest(self, one: Candidate) -> Quantities:
         """Gap with the margin, and the capacitance where that is the wanted one; nothing of what cannot be made."""

@@ -199,19 +199,29 @@ def _kind_of(path: Path) -> Kind | Literal[""]:
 
 def _misplaced(pack: Pack) -> Faults:
     """Files that nothing reads: of another ending or name than those of their folder, or in no folder of a kind."""
-    for kind in packs.SINGULAR:
-        read = {f"{name}{packs.suffix(kind)}" for name in pack.names(kind)} | {"__init__.py"}
-        for path in _listed(pack.place(kind), (".yaml", ".yml", ".py")):
-            if path.name not in read:
-                yield f"{kind}/{path.name}", "nothing reads this file", _where_to(path, kind)
+    yield from _unread(pack)
     for folder in _listed(pack.folder):
         near = nearest(folder.name, packs.SINGULAR)
         if near and folder.is_dir() and folder.name not in packs.SINGULAR:
             yield f"{folder.name}/", "nothing reads this folder", f"rename it to {near}"
     if (pack.folder / packs.MANIFEST).exists():  # else a folder with designs, whose files are named by their paths
-        for path in _listed(pack.folder, (".yaml", ".yml")):
-            if path.name != packs.MANIFEST and (kind_of := _kind_of(path)):
-                yield path.name, f"nothing reads this {packs.SINGULAR[kind_of]} here", f"move it to {kind_of}"
+        yield from _in_no_folder(pack)
+
+
+def _unread(pack: Pack) -> Faults:
+    """Files of another ending or name than those of their folder."""
+    for kind in packs.SINGULAR:
+        read = {f"{name}{packs.suffix(kind)}" for name in pack.names(kind)} | {"__init__.py"}
+        for path in _listed(pack.place(kind), (".yaml", ".yml", ".py")):
+            if path.name not in read:
+                yield f"{kind}/{path.name}", "nothing reads this file", _where_to(path, kind)
+
+
+def _in_no_folder(pack: Pack) -> Faults:
+    """Files beside the folders."""
+    for path in _listed(pack.folder, (".yaml", ".yml")):
+        if path.name != packs.MANIFEST and (kind := _kind_of(path)):
+            yield path.name, f"nothing reads this {packs.SINGULAR[kind]} here", f"move it to {kind}"
 
 
 def _listed(folder: Path, endings: str | tuple[str, ...] = "") -> list[Path]:
@@ -347,18 +357,22 @@ def _cases(params: type[Envelope], usual: dict[str, Any]) -> Iterator[tuple[str,
 
 
 def _scene_faults(scene: Scene, fill: Fill) -> Faults:
-    advice = "correct scene()"
     terminals = sorted(body.terminal for body in scene.bodies if body.terminal)
     if terminals not in (["bottom", "top"], ["bottom", "middle", "top"]):
         yield "terminals", f"terminals are {terminals}", "give one body 'top', and one 'bottom'"
     by_body = {body.name: meshes.mesh(body) for body in scene.bodies}
     for body, fault in meshes.faults(scene, by_body):
-        yield "scene", f"{body}: {fault}", advice
+        yield "scene", f"{body}: {fault}", "correct scene()"
+    yield from _volume_faults(scene, fill)
+
+
+def _volume_faults(scene: Scene, fill: Fill) -> Faults:
+    """Bodies that overlap or leave their box, and air that a support does not fill."""
     volume, box = sum(body.volume_mm3() for body in scene.bodies), math.prod(scene.size_mm)
     is_round = any(piece.is_round() for body in scene.bodies for piece in body.pieces)
     within = 1e-3 if is_round else 1e-9  # beside a circle, a support has chords
     if volume > box * (1 + within):
-        yield "volume", f"bodies have {volume:.6g} mm3, their box {box:.6g} mm3", advice
+        yield "volume", f"bodies have {volume:.6g} mm3, their box {box:.6g} mm3", "correct scene()"
     if fill.support and abs(volume - box) > within * box:
         missing = f"with a support, {box - volume:.3g} mm3 of {box:.6g} mm3 are left empty"
         yield "support", missing, "fill all air with a body 'support' where fill.support is given"
@@ -396,15 +410,19 @@ def _instrument(file: File) -> Faults:
     if not accuracy.is_of(instrument, f"MAKER,{type_},0,1.0"):
         yield "name", f"a reading of {type_!r} would not name it", "end 'name' with the type"
     for one in instrument.ranges:
-        sure = instrument.dc_ohm(one.ohm / 2, 4)
-        if sure is None or not 0 < sure < one.ohm:
-            yield "limits", f"{one.ohm / 2:g} ohm is known to {sure} ohm", "correct the range"
+        error_ohm = instrument.dc_ohm(one.ohm / 2, 4)
+        yield from _limit(error_ohm, one.ohm, f"{one.ohm / 2:g} ohm is", "range")
     z_ohm = complex(0, -math.sqrt(instrument.least_ohm * min(instrument.most_ohm, 1e12)) or -1.0)
     for band in instrument.bands:
         middle = math.sqrt(band.from_hz * band.to_hz)
-        sure = instrument.ac("X", z_ohm.imag, middle, z_ohm)
-        if sure is None or not 0 < sure < abs(z_ohm):
-            yield "limits", f"{abs(z_ohm):g} ohm at {middle:g} Hz are known to {sure} ohm", "correct the band"
+        error_ohm = instrument.ac("X", z_ohm.imag, middle, z_ohm)
+        yield from _limit(error_ohm, abs(z_ohm), f"{abs(z_ohm):g} ohm at {middle:g} Hz are", "band")
+
+
+def _limit(error_ohm: float | None, most_ohm: float, reading: str, part: str) -> Faults:
+    """Refuse an error that is unknown, none, or no less than a resistance."""
+    if error_ohm is None or not 0 < error_ohm < most_ohm:
+        yield "limits", f"{reading} known to {error_ohm} ohm", f"correct the {part}"
 
 
 def _source(file: File) -> Faults:

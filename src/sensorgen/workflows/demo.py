@@ -162,8 +162,7 @@ def _evaluated(
 ) -> Demo:
     """Calibrate by the first run of each specimen, find the presses of the second, and write the report."""
     from sensorgen.analysis import calibration
-    from sensorgen.analysis.report import pieces
-    from sensorgen.analysis.report.contents import report
+    from sensorgen.analysis.report import pieces, report
 
     names = list(truths)
     runs = {name: sorted(run.number for run in log.recordings(specimen=name)) for name in names}

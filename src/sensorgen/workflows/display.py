@@ -52,11 +52,11 @@ def _(of: CompressionResult) -> "Figure":
 
 @display.figure.register(Loaded)
 def _(of: Loaded) -> "Figure":
-    from sensorgen.analysis.plots import response, static
+    from sensorgen.analysis.plots import results, static
 
     z = of.impedance
     axes = (np.asarray(z.force_n), np.asarray(z.position_mm))
-    return static.whole(response.lines(z.frequency_hz, *axes, z.impedance_ohm, of.prediction.design))
+    return static.whole(results.lines(z.frequency_hz, *axes, z.impedance_ohm, of.prediction.design))
 
 
 @display.figure.register(Prediction)

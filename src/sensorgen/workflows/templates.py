@@ -68,13 +68,7 @@ def new(what: What, name: str, pack: str = "") -> NewFile:
         The file cannot be written.
     """
     kind = KINDS[what]
-    if not packs.is_name(kind or "shapes", name):
-        example = {"shape": "block_tip"}.get(what, "lab-eel")
-        raise BadInput(f"{name!r:.60} cannot be a {what}'s name; expected small letters and digits, as {example}")
-    if pack and not packs.NAME.fullmatch(pack):
-        raise BadInput(f"--pack {pack!r:.60}; expected small letters, digits and '-', as lab-filaments")
-    if kind and (ships := packs.shipped_names(kind).get(name)):
-        raise BadInput(f"a {what} {name!r} ships with sensorgen (pack {ships.name}); choose another name")
+    _refuse_name(what, name, pack)
     home = packs.Pack(pack, "own", packs.place() / pack) if pack else packs.beside(Path())
     file = home.path(kind, name) if kind else home.folder / f"{name}.yaml"
     if os.path.lexists(file):
@@ -82,3 +76,15 @@ def new(what: What, name: str, pack: str = "") -> NewFile:
     template = Path(packs.__file__).parent / "templates" / f"{what}{packs.suffix(kind) if kind else '.yaml'}"
     files.replace(file, yamlfile.text(template).replace("NAME", name).encode())
     return NewFile(str(file), _NEXT[what].format(name=name, file=file))
+
+
+def _refuse_name(what: What, name: str, pack: str) -> None:
+    """Refuse what cannot be a name, and a name that ships."""
+    kind = KINDS[what]
+    if not packs.is_name(kind or "shapes", name):
+        example = {"shape": "block_tip"}.get(what, "lab-eel")
+        raise BadInput(f"{name!r:.60} cannot be a {what}'s name; expected small letters and digits, as {example}")
+    if pack and not packs.NAME.fullmatch(pack):
+        raise BadInput(f"--pack {pack!r:.60}; expected small letters, digits and '-', as lab-filaments")
+    if kind and (ships := packs.shipped_names(kind).get(name)):
+        raise BadInput(f"a {what} {name!r} ships with sensorgen (pack {ships.name}); choose another name")

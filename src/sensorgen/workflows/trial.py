@@ -14,10 +14,9 @@ from sensorgen.design.design import Design
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE, FORCE_SHARE, GUESS
-from sensorgen.prediction.new_slice import SliceReport
 from sensorgen.prediction.query import DEFAULT, Query
 from sensorgen.prediction.results import Prediction, caption_of, resolved
-from sensorgen.prediction.slices import PrintReview, reviewed
+from sensorgen.prediction.slices import PrintReview, SliceReport, reviewed
 
 
 @dataclass(frozen=True)
@@ -197,15 +196,8 @@ def _grade(error: Bounds | None, good: float, useless: float) -> int:
 
 def table(tried: Trial) -> Iterator[Part]:
     """Electrode gap, capacitance, resistance of the electrodes, resolution, time of the print where known; doubts."""
-    both, length_m = (tried.drawn, tried.printed), 2 * tried.position_m
-    rows = [
-        ("electrode gap", *(_words(n.gap) for n in both)),
-        ("capacitance", *(_words(n.capacitance) for n in both)),
-        ("top electrode", *(_words(n.top_electrode) for n in both)),
-        ("bottom electrode", *(_words(n.bottom_electrode) for n in both)),
-        ("force resolution", *(_force(n, tried.force_n) for n in both)),
-        ("position resolution", *(_place(n, length_m) for n in both)),
-    ]
+    drawn, printed = (_in_words(n, tried.force_n, 2 * tried.position_m) for n in (tried.drawn, tried.printed))
+    rows = [(name, drawn[name], words) for name, words in printed.items()]
     if tried.toolpath:
         rows.append(("print time", "", f"at least {tried.toolpath.time_s / 60:.0f} min"))
     yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
@@ -216,6 +208,15 @@ def table(tried: Trial) -> Iterator[Part]:
     if tried.reason:
         yield f"{'not predicted: ' * (tried.status == 'not predicted')}{tried.reason}"
     yield from (f"doubtful: {doubt}" for doubt in tried.doubts)
+
+
+def _in_words(numbers: Numbers, force_n: float, length_m: float) -> dict[str, str]:
+    """Numbers of a body by name."""
+    return {
+        "electrode gap": _words(numbers.gap), "capacitance": _words(numbers.capacitance),
+        "top electrode": _words(numbers.top_electrode), "bottom electrode": _words(numbers.bottom_electrode),
+        "force resolution": _force(numbers, force_n), "position resolution": _place(numbers, length_m),
+    }  # fmt: skip
 
 
 def words_of(tried: Trial) -> str:

@@ -18,18 +18,17 @@ from sensorgen.measure.log import BenchRun, Log, Reading, notes, prints
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log.entries import Specimen
 from sensorgen.prediction import bodies
-from sensorgen.prediction.calibration.bench import Bench as Bench
-from sensorgen.prediction.calibration.bench import spread_of as spread_of
 from sensorgen.prediction.calibration.calibration import BEYOND, Calibration, coverage_of, from_json, held_out
-from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, loosened, shared, widened
+from sensorgen.prediction.calibration.fitting import Data, Posterior, calibrated, gain, loosened, shared, widened
 from sensorgen.prediction.calibration.inversion import InvertedPresses
 from sensorgen.prediction.calibration.materials import links
 from sensorgen.prediction.calibration.rest import RestChange, checked
+from sensorgen.prediction.calibration.specimen import Bench as Bench
 from sensorgen.prediction.calibration.specimen import SpecimenModel
+from sensorgen.prediction.calibration.specimen import spread_of as spread_of
 from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
-from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import TONES_HZ, Query
-from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.prediction.sensor_model import SensorModel, sensor_model
 
 FEWEST_RECHECK = 3  # presses from which on a change can be told
 _ALARM = 2.5758293035489004  # normal deviate of 0.5 %
@@ -239,22 +238,24 @@ def calibrate(
     posteriors = [calibrated(one.model, one.data) for one in entries]
     if len(posteriors) > 1:
         posteriors = shared([one.model for one in entries], posteriors, _INSTRUMENT)
-    works = []
-    for one, posterior in zip(entries, posteriors, strict=True):
-        most = float(one.data.presses.force_n.max(initial=0.0)) or 6.0
-        left_out = held_out(one.model, one.data, BEYOND * most, step)
-        others = ", ".join(other.specimen for other in entries if other is not one)
-        notes = (*one.notes, *_off(one, posterior.at))
-        notes += (f"lead, stray and offsets shared with {others}",) if others else ()
-        calibration = Calibration(
-            one.specimen, one.design.name, one.design.id(), one.model, posterior, most,
-            left_out[0] if left_out else None, one.rows,
-            tuple(gain(one.model, one.data, posterior.at).tolist()) if one.recorded else (), notes,
-            links(one.predicted),
-        )  # fmt: skip
-        calibration = replace(calibration, notes=(*notes, *calibration.departures()))
-        works.append(CalibrationWork(calibration, one.data, left_out[1] if left_out else None))
-    return works
+    return [_work(one, posterior, entries, step) for one, posterior in zip(entries, posteriors, strict=True)]
+
+
+def _work(
+    one: SpecimenEntries, posterior: Posterior, entries: Sequence[SpecimenEntries], step: Callable[[str], None]
+) -> CalibrationWork:  # fmt: skip
+    """Calibration by a posterior, tested on presses that are held out of it."""
+    most = float(one.data.presses.force_n.max(initial=0.0)) or 6.0
+    coverage, inverted = held_out(one.model, one.data, BEYOND * most, step) or (None, None)
+    others = ", ".join(other.specimen for other in entries if other is not one)
+    notes = (*one.notes, *_off(one, posterior.at))
+    notes += (f"lead, stray and offsets shared with {others}",) if others else ()
+    gains = tuple(gain(one.model, one.data, posterior.at).tolist()) if one.recorded else ()
+    calibration = Calibration(
+        one.specimen, one.design.name, one.design.id(), one.model, posterior, most, coverage, one.rows, gains, notes,
+        links(one.predicted),
+    )  # fmt: skip
+    return CalibrationWork(replace(calibration, notes=(*notes, *calibration.departures())), one.data, inverted)
 
 
 def _chosen(log: Log, name: str, numbers: Sequence[int]) -> list[BenchRun]:

@@ -23,11 +23,10 @@ from sensorgen.measure.signal.verdicts import along_ohm, leak_s
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.quantities import impedance_at
 from sensorgen.prediction.rest_state import NOTHING_LOST, Lost, lost, rest_state
 from sensorgen.prediction.results import Prediction, from_json
-from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.prediction.sensor_model import SensorModel, sensor_model
 
 _MOST_FILMS = 1 << 14  # readings across films, of one design, that are kept with what they predict
 
@@ -217,7 +216,7 @@ class Movable:
 
     @cached_property
     def model(self) -> SensorModel:
-        """As predicted; raises as :func:`sensorgen.prediction.planning.sensor_model`."""
+        """As predicted; raises as :func:`sensorgen.prediction.sensor_model.sensor_model`."""
         return sensor_model(self.body)[0]
 
     @property

@@ -1,6 +1,223 @@
-"""Material values out of what was measured, as a new source that the next prediction can take."""
+"""Material values out of what was measured, as a new source that the next prediction can take.
 
-from sensorgen.analysis.fit.fitting import STEPS, fit
-from sensorgen.analysis.fit.results import Error, Fit, Fitted, Untold, text
+Specimens are held back: the values come from the others, and the errors before and after are of those held back.
+"""
 
-__all__ = ["STEPS", "Error", "Fit", "Fitted", "Untold", "fit", "text"]
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from dataclasses import replace
+from hashlib import sha256
+from itertools import chain
+from math import log, nan, sqrt
+
+import numpy as np
+
+from sensorgen.analysis.calibration import Bench, SpecimenEntries, known
+from sensorgen.analysis.comparison import AllowedValues, Compared, Comparison, allowed, of_iteration, usable
+from sensorgen.analysis.comparison.expected import Movable, Predicted, at_rest
+from sensorgen.analysis.fit import estimates
+from sensorgen.analysis.fit.estimates import Error, Fit, Fitted, Untold
+from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.design.body import Body, BodyOf
+from sensorgen.design.design import Design
+from sensorgen.measure.log import BenchRun, Log, Reading
+from sensorgen.measure.log.notes import specimen as named
+from sensorgen.prediction import bodies
+from sensorgen.prediction.rest_state import electrode_resistance
+
+HELD_BACK = 0.25  # of the specimens
+SEED = 23
+STEPS = ("readings", "recordings", "values", "errors")
+_ACROSS = Untold("resistivity_ohm_m across", "nothing was measured across the electrodes: R_Y and Re Z run along them")
+
+
+_Which = tuple[int | None, Sequence[str]]  # iteration, or specimens
+
+
+def fit(
+    log: Log, iteration: int | None, seed: int = SEED, body_of: BodyOf = bodies.default_body,
+    step: Callable[[str], None] = lambda _: None, bench: Bench | None = None, *, specimens: Sequence[str] = (),
+    held_share: float = HELD_BACK,
+) -> Fit:  # fmt: skip
+    """Fit material values to the readings and recordings of an iteration or of specimens.
+
+    Parameters
+    ----------
+    log : Log
+        An open one.
+    iteration : int or None
+        Of the design; None where specimens are given.
+    seed : int
+        Of the split between specimens that are fitted to and specimens that are held back.
+    body_of : callable
+        Makes the body of a design that the readings are of.
+    step : callable
+        Called with each of ``STEPS``, and with the name of each design to predict, before it is done.
+    bench : Bench, optional
+        Its tip and force.
+    specimens : sequence of str
+        Specimens as written, in place of an iteration.
+    held_share : float
+        Share of the specimens that are held back [-].
+
+    Raises
+    ------
+    BadInput
+        Nothing of them in the log that a fit could use; no such specimen.
+    """
+    step("readings")
+    specimens = tuple(dict.fromkeys(named(name, log).specimen for name in specimens))
+    comparison = of_iteration(log, iteration, step, body_of, specimens=specimens)
+    left_out = list(comparison.left_out)
+    step("recordings")
+    measured = list(_measured(log, (iteration, specimens), comparison, bench or Bench(), body_of, left_out))
+    allowing = list(_allowing(comparison))
+    readings = [(row.reading.specimen, reading) for row, reading in allowing if usable(row)]
+    names = sorted({specimen for specimen, _ in readings} | {one.specimen for one, _ in measured})
+    if not names:
+        of = ", ".join(specimens) or f"iteration {iteration}"
+        raise BadInput(
+            f"no readings of sound electrodes and no recordings of {of} in {str(log.path)!r}; "
+            "expected some to fit to: sensorgen log list shows what there is"
+        )
+    apart, design = held_back(names, seed, held_share), next(iter(comparison.bodies.values())).design
+    step("values")
+    fits = [
+        estimates.of_specimen(one, print_, Movable(comparison.bodies[comparison.names[one.specimen]]))
+        for one, print_ in measured if one.specimen not in apart
+    ]  # fmt: skip
+    values, untold = _fitted([reading for name, reading in readings if name not in apart], fits, design, seed)
+    step("errors")
+    errors = (
+        *_reading_errors({specimen for specimen, _ in readings} & apart, comparison, values),
+        *_rest_errors([one for one, _ in measured if one.recorded and one.specimen in apart], comparison, values),
+    )
+    groups = tuple(estimates.by_group(_groups(allowing), design.slot("top_electrode")[0].name))
+    return Fit(
+        iteration, specimens, seed, tuple(values), tuple(untold), errors, len(names) - len(apart),
+        tuple(sorted(apart)), tuple(left_out), _fingerprint(log, (iteration, specimens)), groups=groups,
+    )  # fmt: skip
+
+
+def _groups(allowing: Sequence[tuple[Compared, AllowedValues]]) -> dict[str, list[tuple[AllowedValues, bool]]]:
+    """Readings by shape and direction, each with whether its electrode is sound."""
+    groups: dict[str, list[tuple[AllowedValues, bool]]] = {}
+    for row, reading in allowing:
+        groups.setdefault(f"{row.evidence.shape} {row.evidence.axes}".strip(), []).append((reading, usable(row)))
+    return groups
+
+
+def _measured(
+    log: Log, which: _Which, comparison: Comparison, bench: Bench, body_of: BodyOf, left_out: list[tuple[str, str]]
+) -> Iterator[tuple[SpecimenEntries, str]]:
+    """Specimens that the bench or an LCR meter has measured, each with the name of its print."""
+    prints: dict[str, str] = {}
+    for row in (*log.about(BenchRun, *which), *comparison.alternating):
+        prints[row.specimen] = row.batch or prints.get(row.specimen, "")
+    for specimen, print_ in prints.items():
+        try:
+            if specimen not in comparison.names:
+                raise BadInput(f"no design is known of {specimen}")
+            one = known(log, specimen, bench, body_of=body_of)
+        except SensorgenError as error:
+            left_out.append((specimen, str(error)))
+            continue
+        left_out += [(specimen, note) for note in one.left_out]
+        yield one, print_ or specimen
+
+
+def _allowing(comparison: Comparison) -> Iterator[tuple[Compared, AllowedValues]]:
+    """Readings along electrodes, and what each of them allows."""
+    for row in comparison.rows:
+        if row.predicted and (reading := allowed(row, comparison.bodies[row.predicted.design])):
+            yield row, reading
+
+
+def held_back(names: Sequence[str], seed: int, share: float = HELD_BACK) -> frozenset[str]:
+    """A share of the specimens, a quarter if not given, drawn by a seed; none of fewer than four.
+
+    >>> len(held_back("abcdefgh", 23))
+    2
+    """
+    count = round(share * len(names)) if len(names) >= 4 else 0
+    drawn = np.random.default_rng(seed).permutation(len(names))[:count]
+    return frozenset(sorted(names)[k] for k in drawn.tolist())
+
+
+def _fitted(
+    readings: Sequence[AllowedValues], fits: Sequence[estimates.OfSpecimen], design: Design, seed: int
+) -> tuple[list[Fitted], list[Untold]]:
+    """All values and all that stays open; of two values of one quantity the one that is known better."""
+    electrode, film = design.slot("top_electrode")[0].name, design.slot("film")[0].name
+    results = [
+        estimates.resistivity(readings, electrode),
+        *estimates.values(fits),
+        estimates.leak(readings, film, seed),
+    ]
+    values = sorted((one for one in results if isinstance(one, Fitted)), key=lambda one: -one.high / one.low)
+    best = {(one.material, one.quantity): one for one in values}  # the narrowest
+    ordered = {key: best[key] for key in ((r.material, r.quantity) for r in results if isinstance(r, Fitted))}
+    open_ = {u.parameter: u for u in reversed(results) if isinstance(u, Untold) and not _is_told(u, ordered)}
+    return list(ordered.values()), [_ACROSS, *open_.values()]
+
+
+def _is_told(untold: Untold, values: Iterable[tuple[str, str]]) -> bool:
+    """Test whether a value of this quantity was found by other data."""
+    return any(quantity.startswith(untold.parameter.split()[0]) for _, quantity in values)
+
+
+def with_values(body: Body, values: Sequence[Fitted]) -> Body:
+    """A body with fitted values in place of those of its sources."""
+    own: dict[str, dict[str, float]] = {}
+    for value in values:
+        own.setdefault(value.material, {})[value.quantity] = value.value
+    return body.with_values(own)
+
+
+def _reading_errors(
+    specimens: Container[str], comparison: Comparison, values: Sequence[Fitted]
+) -> Iterator[Error]:  # fmt: skip
+    """Residuals of what a fit could have used of some specimens, before and after it."""
+    residuals, after = list[tuple[float, float]](), dict[str, Predicted]()
+    for row in comparison.rows:
+        of = row.predicted
+        if of is None or row.reading.specimen not in specimens or not usable(row):
+            continue
+        if of.design not in after:  # of all quantities its resistance alone is compared
+            body = with_values(comparison.bodies[of.design], values)
+            fitted = electrode_resistance(body, list(of.prediction.resistance))
+            after[of.design] = replace(of, prediction=replace(of.prediction, resistance=fitted))
+        expected = after[of.design].along_ohm(row.across_ohm)
+        residuals.append((row.residual, log(row.verdict.ry_ohm / expected.value) if expected else nan))
+    yield from _error("R_Y", residuals)
+
+
+def _rest_errors(
+    specimens: Sequence[SpecimenEntries], comparison: Comparison, values: Sequence[Fitted]
+) -> Iterator[Error]:
+    residuals = list[tuple[float, float]]()
+    for one in specimens:
+        body = comparison.bodies[comparison.names[one.specimen]]
+        sensors = [Movable(of).model.sensor for of in (body, with_values(body, values))]
+        both = [np.abs(one.data.rest - at_rest(sensor, one.model.frequency_hz)) for sensor in sensors]
+        residuals += np.stack(both, 1).tolist()
+    yield from _error("Z at rest", residuals)
+
+
+def _error(observable: str, residuals: Sequence[tuple[float, float]]) -> Iterator[Error]:
+    """Root mean squares before and after a fit, of residuals that are known; nothing without any."""
+    if residuals:
+        with np.errstate(invalid="ignore"):
+            squares = np.where(np.isfinite(residuals), residuals, nan) ** 2
+        before, after = (sqrt(np.nanmean(column)) if np.isfinite(column).any() else nan for column in squares.T)
+        yield Error(observable, len(residuals), before, after)
+
+
+def _fingerprint(log: Log, which: _Which) -> str:
+    """SHA-256 of what was fitted to."""
+    digest, mark = sha256(), ""
+    readings = (f"{r.uid} {r.specimen} {r.y_ohm} {r.z_ohm} {r.quantity} {r.value}" for r in log.about(Reading, *which))
+    recordings = (f"{run.uid} {run.file} {run.rig_file}" for run in log.about(BenchRun, *which))
+    for line in chain(readings, recordings):
+        digest.update(f"{mark}{line}".encode())
+        mark = "\n"
+    return digest.hexdigest()

@@ -32,18 +32,18 @@ def files(
     Raises
     ------
     OutOfRange
-        As :func:`sensorgen.analysis.plots.response.response`.
+        As :func:`sensorgen.analysis.plots.results.response`.
     MissingValue
         Matplotlib or Plotly is not installed.
     """
-    from sensorgen.analysis.plots import pages, response, static
+    from sensorgen.analysis.plots import pages, results, static
     from sensorgen.analysis.plots.figure import needed
 
     needed("matplotlib", "plotly")
-    answer = response.response(sensor, frequency_hz, force_n, position_mm)
+    answer = results.response(sensor, frequency_hz, force_n, position_mm)
     drawn = [
-        response.identifiability_figure(sensor, frequency_hz, force_n=force_n[-1], title=title),
-        *response.figures(answer),
+        results.identifiability_figure(sensor, frequency_hz, force_n=force_n[-1], title=title),
+        *results.figures(answer),
     ]
     for figure in drawn:
         yield f"{figure.key}.png", static.png(figure)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.analysis.plots.figure import Axis, BodyTriangles, Curve, Figure, Map, Panel, Values
+from sensorgen.core.arrays import Real
 
 _ROW_PX, _LEAST_PX, _PANEL_PX, _SOLID_PX, _FRAME_PX = 19, 260, 320, 560, 110
 _BELOW_PX = 58  # from the last axis to a legend: below its title
@@ -71,8 +72,8 @@ def _layout(panels: Sequence[Panel], figure: Figure) -> Data:
     if solid:
         return layout | {"scene": _scene(panels[0], figure.stretch), "margin": {"l": 0, "r": 0, "t": 0, "b": 0}}
     alike = _alike(panels)
-    for k, panel in enumerate(panels):
-        number = str(k + 1) if k else ""
+    numbers = ["", *map(str, range(2, len(panels) + 1))]
+    for k, (number, panel) in enumerate(zip(numbers, panels, strict=True)):
         layout[f"yaxis{number}"] = _axis(panel.y) | {"domain": _domain(panels, k)}
         if not alike:
             layout[f"xaxis{number}"] = _axis(panel.x) | {"anchor": f"y{number}"}
@@ -80,14 +81,19 @@ def _layout(panels: Sequence[Panel], figure: Figure) -> Data:
         if panel.equal:
             layout[f"yaxis{number}"]["scaleanchor"] = f"x{'' if alike else number}"
     if alike:
-        layout["xaxis"] = _axis(panels[0].x) | {"anchor": f"y{len(panels) if len(panels) > 1 else ''}"}
+        layout["xaxis"] = _axis(panels[0].x) | {"anchor": f"y{numbers[-1]}"}
     if len(panels) > 1 and not figure.chooser:
-        layout["annotations"] = [
-            {"text": escape(panel.title), "xref": "paper", "yref": "paper", "x": 0, "y": _domain(panels, k)[1],
-             "yanchor": "bottom", "showarrow": False} for k, panel in enumerate(panels) if panel.title
-        ]  # fmt: skip
+        layout["annotations"] = _titles(panels)
         layout["legend"] |= {"y": -_BELOW_PX / (height_px(figure) - _FRAME_PX), "yanchor": "top"}
     return layout
+
+
+def _titles(panels: Sequence[Panel]) -> list[Data]:
+    """Titles over the panels that have one."""
+    return [
+        {"text": escape(panel.title), "xref": "paper", "yref": "paper", "x": 0, "y": _domain(panels, k)[1],
+         "yanchor": "bottom", "showarrow": False} for k, panel in enumerate(panels) if panel.title
+    ]  # fmt: skip
 
 
 def _alike(panels: Sequence[Panel]) -> bool:
@@ -147,11 +153,7 @@ def _map(part: Map, panel: Panel, domain: list[float]) -> Iterator[Data]:
     values = np.log10(part.values) if part.log else part.values
     low, high = (log10(end) for end in part.span) if part.log else part.span
     colours: Any = _DIVERGING if part.signed else "Viridis"
-    bar: Data = {"thickness": 12, "title": {"text": escape(part.label), "side": "right"}, "y": sum(domain) / 2,
-                 "len": domain[1] - domain[0], "lenmode": "fraction"}  # fmt: skip
-    if part.log:
-        ticks = np.arange(np.ceil(low), np.floor(high) + 1)
-        bar |= {"tickvals": ticks.tolist(), "ticktext": [f"{10.0**t:g}" for t in ticks]}
+    bar = _bar(part, low, high, domain)
     across, up = (escape(axis.title.partition(" [")[0]) for axis in (panel.x, panel.y))
     if part.values.ndim == 2 and part.x.ndim == 1:
         grid = {"x": packed(part.x), "y": packed(part.y), "z": packed(values)}
@@ -160,10 +162,9 @@ def _map(part: Map, panel: Panel, domain: list[float]) -> Iterator[Data]:
             "type": "heatmap", "colorscale": colours, "reversescale": part.log, "colorbar": bar,
             "hovertemplate": f"{across} %{{x:.4g}}, {up} %{{y:.4g}}: %{{{value}:.5g}}<extra></extra>",
         } | ({"customdata": packed(part.values)} if part.log else {})  # fmt: skip
-        yield from (grid | _level(log10(level), solid=not k) for k, level in enumerate(part.levels if part.log else ()))
+        yield from _levels(part, grid)
         return
-    every = max(1, round((part.values.size / _MOST_MARKS) ** (1 / part.values.ndim)))
-    x, y, colour = (v[(slice(None, None, every),) * v.ndim].ravel() for v in (part.x, part.y, values))
+    x, y, colour = _thinned(part.x, part.y, values)
     yield {
         "type": "scatter", "mode": "markers", "x": packed(x), "y": packed(y), "showlegend": False,
         "hovertemplate": f"{across} %{{x:.5g}}, {up} %{{y:.5g}}: %{{marker.color:.5g}}<extra></extra>",
@@ -172,12 +173,29 @@ def _map(part: Map, panel: Panel, domain: list[float]) -> Iterator[Data]:
     }  # fmt: skip
 
 
-def _level(at: float, *, solid: bool) -> Data:
-    """White line along which a quantity has a value."""
-    return {
-        "type": "contour", "showscale": False, "hoverinfo": "skip",
-        "contours": {"coloring": "lines", "start": at, "end": at, "size": 1},
-        "line": {"dash": "solid" if solid else "dash", "width": 2}, "colorscale": [[0, "#fff"], [1, "#fff"]],
+def _bar(part: Map, low: float, high: float, domain: list[float]) -> Data:
+    """Bar of the colours; of a log scale its ticks are powers of ten."""
+    bar: Data = {"thickness": 12, "title": {"text": escape(part.label), "side": "right"}, "y": sum(domain) / 2,
+                 "len": domain[1] - domain[0], "lenmode": "fraction"}  # fmt: skip
+    if not part.log:
+        return bar
+    ticks = np.arange(np.ceil(low), np.floor(high) + 1)
+    return bar | {"tickvals": ticks.tolist(), "ticktext": [f"{10.0**t:g}" for t in ticks]}
+
+
+def _thinned(x: Real, y: Real, values: Real) -> tuple[Real, ...]:
+    """Every so many of the values along each axis, at most ``_MOST_MARKS`` in all."""
+    every = max(1, round((values.size / _MOST_MARKS) ** (1 / values.ndim)))
+    return tuple(v[(slice(None, None, every),) * v.ndim].ravel() for v in (x, y, values))
+
+
+def _levels(part: Map, grid: Data) -> Iterator[Data]:
+    """White lines along which a quantity on a log scale has certain values, the first one solid."""
+    for k, level in enumerate(map(log10, part.levels) if part.log else ()):
+        yield grid | {
+            "type": "contour", "showscale": False, "hoverinfo": "skip",
+            "contours": {"coloring": "lines", "start": level, "end": level, "size": 1},
+            "line": {"dash": "dash" if k else "solid", "width": 2}, "colorscale": [[0, "#fff"], [1, "#fff"]],
     }  # fmt: skip
 
 

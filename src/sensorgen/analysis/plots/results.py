@@ -1,17 +1,40 @@
-"""Figures of results: findings in the section of a sensor, sweeps, a cell under stress, and contacts of a sheet."""
+"""Figures of predictions: response to a load and its inverse (thesis Ch. 6), identifiability, sweeps, cells, sheets.
 
+Findings are shown in the section of a sensor.
+"""
+
+import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sensorgen.analysis.plots.figure import BLUE, COLOURS, ORANGE, Axis, Curve, Figure, Map, Panel, look, scale
+from sensorgen.analysis.plots.figure import (
+    BLUE,
+    COLOURS,
+    GREY,
+    ORANGE,
+    Axis,
+    Curve,
+    Figure,
+    Map,
+    Panel,
+    frequency,
+    look,
+    scale,
+)
 from sensorgen.checks.review import Review
+from sensorgen.core.arrays import Complex, Mask, Real, Whole
 from sensorgen.core.document import Cell, Table
+from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
+from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.compression import CompressionResult
+from sensorgen.prediction.identifiability.fisher import LeastErrors, Setup, bounds, required, slopes
+from sensorgen.prediction.identifiability.identify import HIGHEST_HZ, surface
+from sensorgen.prediction.query import FORCE_N, NOISE
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.sweep import Sweep
 
@@ -52,12 +75,12 @@ def _from_side(ends_mm: Any) -> tuple[Any, Any]:
 def ranges(prediction: Prediction) -> Figure:
     """Range of each quantity over its best value, whole and by each cause."""
     curves = {}
-    for name, bounds in prediction.quantities().items():
-        if bounds and 0.0 < bounds.value < inf:
-            causes = {"model": bounds.model, "print": bounds.print, "material": bounds.material, "leads": bounds.leads}
-            for k, (cause, part) in enumerate({"all": bounds, **causes}.items()):
+    for name, whole in prediction.quantities().items():
+        if whole and 0.0 < whole.value < inf:
+            causes = {"model": whole.model, "print": whole.print, "material": whole.material, "leads": whole.leads}
+            for k, (cause, part) in enumerate({"all": whole, **causes}.items()):
                 if part and part.lower < part.upper:
-                    row, ends = f"{name}: {cause}", (part.lower / bounds.value, part.upper / bounds.value)
+                    row, ends = f"{name}: {cause}", (part.lower / whole.value, part.upper / whole.value)
                     curves[row] = Curve("points", "", [1.0], [row], [ends[0]], [ends[1]], colour=COLOURS[k])
     panel = Panel(tuple(curves.values()), Axis("relative to the best value", log=True), Axis(names=tuple(curves)))
     alt = "Ranges of the predicted quantities, whole and by model, print, material and leads."
@@ -186,3 +209,287 @@ def _port_panel(film: "Sheet", name: str, bounds: "PressErrors", ports: Sequence
     x, y = (Axis(f"{axis} [mm]", low=0.0, high=size / M_PER_MM)
             for axis, size in (("x", film.length_m), ("y", film.width_m)))  # fmt: skip
     return Panel((drawn, *contacts), x, y, title="" if row else name, equal=True)
+
+
+FORCES, POSITIONS, FREQUENCIES = 60, 161, 121
+HZ_PER_KHZ = 1e3
+
+
+def identifiability_figure(
+    sensor: Sensor, frequency_hz: Sequence[float], noise: float = NOISE, force_n: float = FORCE_N, title: str = ""
+) -> Figure:
+    """Maps of the standard errors of force and position, and both for a single frequency.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Under load.
+    frequency_hz : sequence of float
+        Frequencies [Hz].
+    noise : float
+        As of :func:`sensorgen.prediction.identifiability.card` [-].
+    force_n : float
+        Greatest load [N].
+    title : str
+        Name of the sensor.
+    """
+    setup = Setup(sensor, tuple(frequency_hz), noise, force_n, sensor.length_m / 2, max(HIGHEST_HZ, *frequency_hz))
+    force, place = np.linspace(force_n / FORCES, force_n, FORCES), np.linspace(0.0, sensor.length_m, POSITIONS)
+    limits, need = surface(setup, force, place), required(setup)
+    panels = (
+        _map("force", "N", place, force, limits.force_n, need.force_n),
+        _map("position", "mm", place, force, limits.position_m / M_PER_MM, need.position_m / M_PER_MM),
+        *_by_frequency(setup),
+    )
+    words = f"{title}{', ' if title else ''}{len(setup.frequency_hz)} frequencies, noise {noise * 100:g} %"
+    alt = (
+        "Standard errors of force and position over force and position (Cramér-Rao), and below them the error that one "
+        "frequency alone would give. Solid line: the required error; dashed: ten times that."
+    )
+    return Figure("identifiability", f"Can it sense force and position? {words}", alt, {"": panels}, columns=2)
+
+
+def _map(quantity: str, unit: str, place: Real, force: Real, sigma: Real, need: float) -> Panel:
+    """Standard error on a logarithmic scale about the required one."""
+    drawn = Map(place / M_PER_MM, force, sigma, f"standard error of {quantity} [{unit}]", need / 10, need * 1e3,
+                log=True, levels=(need, 10 * need))  # fmt: skip
+    x, y = Axis("position, centre of the tip [mm]"), Axis("force [N]")
+    return Panel((drawn,), x, y, title=f"error of {quantity} (solid line: {need:g} {unit}, as required)")
+
+
+def _by_frequency(setup: Setup) -> tuple[Panel, Panel]:
+    """Standard errors that one frequency alone would give, those in use marked."""
+    grid = np.geomspace(min(setup.frequency_hz), setup.highest_hz, FREQUENCIES)
+    used = np.array(setup.frequency_hz)
+    swept, marked = _single(setup, grid), _single(setup, used)
+    corner = setup.sensor.corner_frequency_hz() / HZ_PER_KHZ if setup.sensor.resistance_ohm() else 0.0
+    panels = []
+    for quantity, unit, colour, pick in (("force", "N", BLUE, "force_n"), ("position", "mm", ORANGE, "position_m")):
+        per = M_PER_MM if unit == "mm" else 1.0
+        line, dots = getattr(swept, pick) / per, getattr(marked, pick) / per
+        finite = line[np.isfinite(line) & (line > 0)]
+        low, high = (finite.min() / 3, finite.max() * 3) if len(finite) else (1e-3, 1.0)  # a flat curve looks flat
+        content = [
+            Curve("line", "", grid / HZ_PER_KHZ, line, colour=colour),
+            Curve("points", "", used / HZ_PER_KHZ, dots, colour=colour),
+        ]
+        if corner:
+            content.append(Curve("line", "corner frequency", [corner, corner], [low, high], colour=GREY, dash="dot"))
+        y = Axis(f"standard error of {quantity} [{unit}]", log=True, low=float(low), high=float(high))
+        words = f"one frequency alone, {setup.force_n:g} N in the middle"
+        panels.append(Panel(tuple(content), Axis("frequency [kHz]", log=True), y, title=words))
+    return panels[0], panels[1]
+
+
+def _single(setup: Setup, frequency_hz: Real) -> LeastErrors:
+    by_press = slopes(setup.sensor, frequency_hz, setup.force_n, setup.position_m)
+    return bounds(type(by_press)(*(slope[:, None] for slope in by_press)), setup.noise)
+
+
+LARGEST = 500_000  # points that a page in a browser still draws at once
+MOST_FREQUENCIES = 24  # panels that a picture still shows
+LINES = 7  # of constant force, and of constant position
+POSITION, FORCE = Axis("position [mm]"), Axis("force [N]")
+
+
+@dataclass(frozen=True)
+class RealQuantity:
+    """A real quantity over force and position."""
+
+    symbol: str
+    title: str
+    unit: str
+
+
+QUANTITIES = {
+    "resistance": RealQuantity("R", "Resistance R, real part of the impedance", "Ω"),
+    "reactance": RealQuantity("X", "Reactance X, imaginary part of the impedance", "Ω"),
+    "resistance-by-position": RealQuantity("dR/dx", "Change of resistance per position, dR/dx", "Ω/mm"),
+    "resistance-by-force": RealQuantity("dR/dF", "Change of resistance per force, dR/dF", "Ω/N"),
+    "reactance-by-position": RealQuantity("dX/dx", "Change of reactance per position, dX/dx", "Ω/mm"),
+    "reactance-by-force": RealQuantity("dX/dF", "Change of reactance per force, dX/dF", "Ω/N"),
+}
+
+
+@dataclass(frozen=True)
+class ResponseMap:
+    """Impedance and its slopes; the axes of the arrays are frequency, force and position.
+
+    Attributes
+    ----------
+    frequency_hz, force_n, position_mm : (n,) array
+        Frequencies [Hz], forces [N], centres of the tip [mm].
+    impedance_ohm : complex array
+        Impedance [ohm].
+    by_force_ohm_per_n, by_position_ohm_per_mm : complex array
+        Its exact derivatives [ohm/N], [ohm/mm].
+    tip_mm, length_mm : float
+        Of the tip and of the sensor [mm].
+    """
+
+    frequency_hz: Real
+    force_n: Real
+    position_mm: Real
+    impedance_ohm: Complex
+    by_force_ohm_per_n: Complex
+    by_position_ohm_per_mm: Complex
+    tip_mm: float
+    length_mm: float
+
+    def values(self, name: str) -> Real:
+        """One of ``QUANTITIES``, over frequency, force and position, in the unit named there."""
+        slopes = {"position": self.by_position_ohm_per_mm, "force": self.by_force_ohm_per_n}
+        part, _, by = name.partition("-by-")
+        source = slopes.get(by, self.impedance_ohm)
+        return np.asarray(source.real if part == "resistance" else source.imag)
+
+    def on_sensor(self) -> Mask:
+        """Positions where the whole tip rests on the sensor; all, where it does at none."""
+        half = self.tip_mm / 2 * (1 + 1e-9)  # where the tip just reaches an end, the slopes jump
+        inside = (self.position_mm > half) & (self.position_mm < self.length_mm - half)
+        return inside if inside.any() else ~inside
+
+    def folds(self) -> Mask:
+        """Loads beyond which (F, x) -> (R, X) turns over: the sign of its determinant changes towards the next."""
+        turning = (np.conj(self.by_force_ohm_per_n) * self.by_position_ohm_per_mm).imag
+        turning = np.sign(np.where(np.abs(turning) > 1e-12 * np.abs(turning).max(initial=0), turning, 0))
+        folded = np.zeros(turning.shape, bool)
+        folded[:, :-1] |= turning[:, :-1] * turning[:, 1:] < 0
+        folded[:, :, :-1] |= turning[:, :, :-1] * turning[:, :, 1:] < 0
+        return folded
+
+
+def response(
+    sensor: Sensor, frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float]
+) -> ResponseMap:
+    """Work out what is drawn.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Under load.
+    frequency_hz, force_n, position_mm : sequence of float
+        Frequencies [Hz], forces [N] and centres of the tip [mm], each rising.
+
+    Raises
+    ------
+    OutOfRange
+        Too little or too much to draw; a position or a force beyond the sensor's range.
+    """
+    f, force, at = (np.asarray(values, float) for values in (frequency_hz, force_n, position_mm))
+    if min(len(force), len(at)) < 2:
+        raise OutOfRange(f"{len(force)} force(s) and {len(at)} position(s) make no map; expected two or more of each")
+    if len(f) > MOST_FREQUENCIES or math.prod(map(len, (f, force, at))) > LARGEST:
+        raise OutOfRange(
+            f"{len(f)} frequencies, {len(force)} forces and {len(at)} positions are too much to draw; "
+            f"expected up to {MOST_FREQUENCIES} frequencies and {LARGEST} points in all: use larger steps"
+        )
+    result = sensor.response(f[:, None, None], force[:, None], at * M_PER_MM)
+    by_mm = result.by_position_ohm_per_m * M_PER_MM
+    size = (sensor.tip_m / M_PER_MM, sensor.length_m / M_PER_MM)
+    return ResponseMap(f, force, at, result.impedance_ohm, result.by_force_ohm_per_n, by_mm, *size)
+
+
+def lines(frequency_hz: Sequence[float], force_n: Real, position_mm: Real, impedance_ohm: Complex, name: str) -> Figure:
+    """R and X as lines over the longer of force and position, for some values of the other, at two frequencies.
+
+    Parameters
+    ----------
+    frequency_hz, force_n, position_mm : (f,), (n,), (m,) array
+        Axes [Hz], [N], [mm].
+    impedance_ohm : (f, n, m) complex array
+        Over them [ohm].
+    name : str
+        Of the design.
+    """
+    over_force = len(force_n) > len(position_mm)
+    x, others, unit = (force_n, position_mm, "mm") if over_force else (position_mm, force_n, "N")
+    z = impedance_ohm.swapaxes(1, 2) if over_force else impedance_ohm  # the longer axis last
+    panels = []
+    for k in sorted({0, len(frequency_hz) - 1}):
+        at = frequency(frequency_hz[k])
+        for symbol, part in (("R", z[k].real), ("X", z[k].imag)):
+            divisor, ohm = scale(part, "Ω")
+            curves = tuple(
+                Curve(kind, f"{others[j]:g} {unit}" if kind == "line" else "", x, part[j] / divisor, **look(n))
+                for n, j in enumerate(_some(others)) for kind in ("line", "points")
+            )  # fmt: skip
+            panels.append(Panel(curves, FORCE if over_force else POSITION, Axis(f"{symbol} [{ohm}] at {at}")))
+    along = "force" if over_force else "position"
+    return Figure("response", f"{name} under load", f"R and X over {along}.", {"": tuple(panels)}, columns=2)
+
+
+def _some(values: Real) -> Whole:
+    """Numbers of some values, from the first to the last, for lines of each."""
+    return np.unique(np.linspace(0, len(values) - 1, min(LINES, len(values))).round().astype(np.int64))
+
+
+def quantity(of: ResponseMap, name: str) -> Figure:
+    """One of ``QUANTITIES`` over force and position, at each frequency.
+
+    The colours span the positions where the whole tip rests on the sensor, of slopes without the extreme 4 %, mostly
+    those of the first touch: they are so large that they would hide all others.
+    """
+    about, values = QUANTITIES[name], of.values(name)
+    loaded = np.ix_(of.force_n >= 0, of.on_sensor())
+
+    def panels(k: int, at: str) -> Iterator[Panel]:
+        divisor, unit = scale(values[k][loaded], about.unit)
+        shown = values[k] / divisor
+        low, high = np.percentile(shown[loaded], (2, 98) if "-by-" in name else (0, 100)).tolist()
+        label = f"{about.symbol} [{unit}]"
+        plain = Map(of.position_mm, of.force_n, shown, label, low, high)
+        content = (replace(plain, levels=_levels(*plain.span)),)
+        yield Panel(content, POSITION, FORCE, title=f"{label} at {at}")
+
+    alt = f"{about.title}, over force and position; the colours span positions where the whole tip rests on the sensor."
+    return Figure.by_frequency(name, about.title, alt, of.frequency_hz, panels, columns=4)
+
+
+def _levels(low: float, high: float, count: int = 7) -> tuple[float, ...]:
+    """Round numbers strictly between two others."""
+    if not high > low:
+        return ()
+    step = 10.0 ** math.floor(math.log10((high - low) / count))
+    step *= next(m for m in (1, 2, 5, 10) if (high - low) / (m * step) <= count)
+    return tuple(k * step for k in range(math.floor(low / step) + 1, math.ceil(high / step)))
+
+
+def inverse(of: ResponseMap, which: str) -> Figure:
+    """Inverse map: "position" or "force" over the plane of R and X, at each frequency (thesis Fig. 6.4).
+
+    The plane is coloured where a load can lie. Where lines of constant force and of constant position run together,
+    R and X do not determine both; where the map folds, two loads give the same R and X.
+    """
+    unit = {"position": "mm", "force": "N"}[which]
+    colour = np.broadcast_to(of.position_mm if which == "position" else of.force_n[:, None], of.folds().shape[1:])
+    forces, positions = _some(of.force_n), _some(of.position_mm)
+
+    def panels(k: int, at: str) -> Iterator[Panel]:
+        r, x = of.values("resistance")[k], of.values("reactance")[k]
+        (r_divisor, r_unit), (x_divisor, x_unit) = scale(r, "Ω"), scale(x, "Ω")
+        r, x = r / r_divisor, x / x_divisor
+        folded = of.folds()[k]
+        content: tuple[Curve | Map, ...] = (
+            Map(r, x, colour, f"{which} [{unit}]"),
+            *(Curve("line", "", r[j], x[j], colour="#000000") for j in forces),
+            *(Curve("line", "", r[:, i], x[:, i], colour="#000000", dash="dash") for i in positions),
+            *([Curve("points", "", r[folded], x[folded], colour="#ff0000")] if folded.any() else []),
+        )
+        yield Panel(content, Axis(f"R [{r_unit}]"), Axis(f"X [{x_unit}]"), title=at)
+
+    folds = "; red: folds" if of.folds().any() else ""
+    solid, dashed = (
+        ", ".join(f"{v:.3g}" for v in values) for values in (of.force_n[forces], of.position_mm[positions])
+    )
+    title = f"{which.capitalize()} from R and X\nsolid lines: {solid} N; dashed: {dashed} mm{folds}"
+    alt = (
+        f"{which.capitalize()} in colours over R and X. Lines of constant force are solid, of constant position dashed."
+    )
+    return Figure.by_frequency(f"inverse-{which}", title, alt, of.frequency_hz, panels, columns=4)
+
+
+def figures(of: ResponseMap) -> Iterator[Figure]:
+    """All of them: quantities, then the inverse maps."""
+    yield from (quantity(of, name) for name in QUANTITIES)
+    yield from (inverse(of, which) for which in ("position", "force"))

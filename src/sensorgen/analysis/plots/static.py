@@ -91,12 +91,18 @@ def drawn(figure: Figure, panels: Sequence[Panel], title: str = "") -> "Drawn":
     for k, (axes, panel) in enumerate(zip(grid, panels, strict=False)):
         _panel(axes, panel, figure)
         _titled(axes, panel, panels[k + columns : k + columns + 1], panels[k - 1 : k] if k % columns else ())
+    if not figure.beside:
+        _legend(canvas, grid)
+    return canvas
+
+
+def _legend(canvas: "Drawn", grid: Sequence[Any]) -> None:
+    """Every name once, under the panels."""
     handles = [axes.get_legend_handles_labels() for axes in grid]
     named = {label: handle for pair in handles for handle, label in zip(*pair, strict=True)}
-    if named and not figure.beside:  # every name once, under the panels
+    if named:
         ncols = min(len(named), 6 if canvas.get_figwidth() > 9 else 4)
         canvas.legend(named.values(), named.keys(), loc="outside lower left", ncols=ncols, frameon=False)
-    return canvas
 
 
 def _height_in(panel: Panel, tall: float) -> float:

@@ -8,7 +8,8 @@ from math import degrees, isfinite, nan, pi
 from statistics import median
 from typing import Annotated
 
-from sensorgen.analysis.comparison import Comparison, Predicted
+from sensorgen.analysis.comparison import Comparison
+from sensorgen.analysis.comparison.expected import Predicted
 from sensorgen.analysis.plots.figure import BLUE, GREY, Axis, Curve, Figure, Panel
 from sensorgen.core.document import Cell, Column, Table, some
 from sensorgen.core.units import frequency_text

@@ -87,11 +87,10 @@ def sentences(explanations: Sequence[Explanation]) -> Iterator[str]:
         best = next(e for e in explanations if e.kind == kind)
         if best.share_percent > 100 * _FLAT:
             by = f"of {best.value:.3g} S" if best.parameter == LEAK else f"scaled by {best.value:.3g}"
-            yield (
-                f"{kind.capitalize()}: {best.parameter} {by} explains {best.share_percent:.3g} % of the squared "
-                "residuals."
-            )
-    silent = [p for p in PARAMETERS if all(e.share_percent <= 100 * _FLAT for e in explanations if e.parameter == p)]
+            share = f"{best.share_percent:.3g} % of the squared residuals"
+            yield f"{kind.capitalize()}: {best.parameter} {by} explains {share}."
+    loud = {e.parameter for e in explanations if not e.share_percent <= 100 * _FLAT}
+    silent = [p for p in PARAMETERS if p not in loud]
     if silent and explanations:
         yield f"These readings cannot constrain {', '.join(silent[:-1])}{' or ' if silent[1:] else ''}{silent[-1]}."
 

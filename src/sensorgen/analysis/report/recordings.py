@@ -16,6 +16,7 @@ from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import si
+from sensorgen.prediction.results import Impedance
 
 _SAME = 1e-6  # relative: frequencies nearer than this are the same
 _SURE = 3.0  # standard errors by which a reading is beyond a range
@@ -69,22 +70,32 @@ def impedances(recorded: Sequence[RecordedRun], comparison: Comparison) -> Table
     rows: list[ImpedanceRow] = []
     for run in recorded:
         of = comparison.predictions.get(comparison.names.get(run.entry.specimen, ""))
-        known = of.prediction.impedance if of else ()
-        c = [None if c is None else c / F_PER_PF for c in _predicted(of.prediction.capacitance if of else None)]
+        design, known, capacitance = (
+            (of.design, of.prediction.impedance, of.prediction.capacitance) if of else ("", (), None)
+        )
+        c_pf = [None if c is None else c / F_PER_PF for c in _predicted(capacitance)]
         noise = np.hypot(run.noise_ohm.real, run.noise_ohm.imag) / np.abs(run.rest_ohm) / 2**0.5
         measured = zip(run.tones_hz.tolist(), run.rest_ohm, run.rest_error_ohm, noise.tolist(), strict=True)
         for f, z, error, share in measured:
             e = next((e for e in known if abs(e.frequency_hz / f - 1) < _SAME), None)
-            middle = complex(e.re.value, e.im.value) if e else complex("nan")
-            off = (complex(z) - middle) / abs(middle)
+            re, im = (e.re, e.im) if e else (None, None)
+            off = _residual(complex(z), e)
             rows.append(ImpedanceRow(
-                run.name, of.design if of else "", f,
-                float(z.real), float(error.real), *_predicted(e.re if e else None),
-                float(z.imag), float(error.imag), *_predicted(e.im if e else None), off.real if e else None,
-                off.imag if e else None, 100 * share, verdict(complex(z)),
-                float(-1 / (2 * pi * f * z.imag)) / F_PER_PF, c[0], c[1], c[2],
+                run.name, design, f,
+                float(z.real), float(error.real), *_predicted(re),
+                float(z.imag), float(error.imag), *_predicted(im), *off, 100 * share, verdict(complex(z)),
+                float(-1 / (2 * pi * f * z.imag)) / F_PER_PF, *c_pf,
             ))  # fmt: skip
     return Table.of("impedance", "Impedance at rest and its prediction, by frequency", rows)
+
+
+def _residual(z_ohm: complex, expected: Impedance | None) -> tuple[float | None, float | None]:
+    """Residuals of R and X, relative to the prediction's magnitude."""
+    if expected is None:
+        return None, None
+    middle = complex(expected.re.value, expected.im.value)
+    off = (z_ohm - middle) / abs(middle)
+    return off.real, off.imag
 
 
 def _predicted(of: Bounds | None) -> tuple[float | None, float | None, float | None]:
@@ -124,13 +135,17 @@ def findings(recorded: Sequence[RecordedRun], table: Table | None) -> Iterator[s
     for run in recorded:
         mine = [row for row in rows if row.recording == run.name]
         verdicts = {row.frequency_hz: row.verdict for row in mine}
-        if negative := [at_text(f) for f, word in verdicts.items() if word == "negative resistance"]:
-            at = ", ".join(negative)
-            yield f"Flagged: {run.name} has a negative resistance at {at}: check the bridge's calibration."
-        if off := [f"{part} at {where}" for part in "RX" if (where := ", ".join(_outside(mine, part)))]:
-            yield f"Flagged: {run.name} is outside the predicted range by its {' and '.join(off)}."
+        yield from (f"Flagged: {run.name} {fault}." for fault in _faults(mine))
         if run.pairs is None and mine:
             yield _at_rest(run.name, min(mine, key=lambda row: row.frequency_hz), verdicts)
+
+
+def _faults(rows: Sequence[ImpedanceRow]) -> Iterator[str]:
+    """Impedances of a recording that cannot be, or were not expected."""
+    if negative := [at_text(row.frequency_hz) for row in rows if row.verdict == "negative resistance"]:
+        yield f"has a negative resistance at {', '.join(negative)}: check the bridge's calibration"
+    if off := [f"{part} at {where}" for part in "RX" if (where := ", ".join(_outside(rows, part)))]:
+        yield f"is outside the predicted range by its {' and '.join(off)}"
 
 
 def _at_rest(name: str, low: ImpedanceRow, verdicts: dict[float, str]) -> str:

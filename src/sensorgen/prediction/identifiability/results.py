@@ -300,6 +300,10 @@ class Identifiability(StandardErrors):
             yield "on a bench", words
         yield "over all", self._over_all()
         yield "best", self._best()
+        yield from self._remedies()
+
+    def _remedies(self) -> Iterator[tuple[str, str]]:
+        """Changes that reduce the errors, one by one and together."""
         if not self.changes:
             yield "to improve", "none of the changes that were tried"
         for k, change in enumerate(self.changes):

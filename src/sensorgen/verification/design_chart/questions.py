@@ -15,7 +15,7 @@ from sensorgen.design.values import film, permittivities
 from sensorgen.models import CapacitanceModel, capacitance_models, thesis_cells
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction import mesh_ladder, planning
+from sensorgen.prediction import mesh_ladder, sensor_model
 from sensorgen.prediction.capacitance import expected, is_plate
 from sensorgen.prediction.compression_law import CLOSED_FORM, elastic, law_of
 from sensorgen.prediction.query import Query
@@ -109,7 +109,7 @@ def questions(body: Body, query: Query) -> list[Question]:
         Nothing can be predicted of it, as of a short; a load that the sensor cannot take.
     """
     load = query.load(body.design)
-    sensor = planning.rough_sensor(body, "", query.tip_of(body.design)).sensor
+    sensor = sensor_model.rough_sensor(body, "", query.tip_of(body.design)).sensor
     stress_pa = float(sensor.stress_pa(load.force_n, load.position_m))
     return [
         _capacitance(body), _compression(body, stress_pa), _line(sensor, query, body), _prediction(body, query),
@@ -273,7 +273,7 @@ def _prediction(body: Body, query: Query) -> Question:
 
 def _seconds(body: Body, query: Query) -> float:
     """Expected time of a prediction [s]."""
-    plan = planning.plan(body, query.load(body.design), query.accuracy, query.law, query.tip_of(body.design)).plan
+    plan = sensor_model.plan(body, query.load(body.design), query.accuracy, query.law, query.tip_of(body.design)).plan
     chosen = (next(c for c in level.candidates if c.model == level.chosen) for level in plan.levels)
     return sum(c.expected_seconds or 0.0 for c in chosen)
 

@@ -10,8 +10,8 @@ from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.body import Body
 from sensorgen.models.compression import Plate
-from sensorgen.prediction.planning import rough_sensor
 from sensorgen.prediction.query import Query
+from sensorgen.prediction.sensor_model import rough_sensor
 from sensorgen.verification import peers
 from sensorgen.verification.apart import Runner, TimedAnswer, apart
 from sensorgen.verification.design_chart.questions import (

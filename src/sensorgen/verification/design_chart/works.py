@@ -42,7 +42,7 @@ def rise_by_law(body: "Body", law: str, stress_pa: float) -> ModelAnswer:
     """Relative rise of the capacitance under a pressure [-], by a law that solves no field."""
     import numpy as np
 
-    from sensorgen.prediction.planning import rough_sensor
+    from sensorgen.prediction.sensor_model import rough_sensor
 
     compression = rough_sensor(body, law).law.compression
     strain = float(compression.capacitive_strain(np.asarray(stress_pa))[0])
@@ -70,13 +70,13 @@ def line(model: str, line: "PressedLine", fineness: Mapping[str, int]) -> ModelA
 
 def predicted(body: "Body", query: "Query", *, rough: bool = False) -> ModelAnswer:
     """Impedance of the sensor under the reference load at every frequency [ohm]."""
-    from sensorgen.prediction import planning
+    from sensorgen.prediction import sensor_model
 
     load, width = query.load(body.design), None
     if rough:
-        model = planning.rough_sensor(body, query.law, query.tip_of(body.design))
+        model = sensor_model.rough_sensor(body, query.law, query.tip_of(body.design))
     else:
-        model, plan = planning.sensor_model(body, query)
+        model, plan = sensor_model.sensor_model(body, query)
         width = plan.width
     z = model.sensor.impedance(list(load.frequency_hz), load.force_n, load.position_m)
     return ModelAnswer(tuple(z.tolist()), width)

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
-from sensorgen.analysis.characterise import selection
+from sensorgen.analysis.characterise import posterior as posteriors
 from sensorgen.analysis.characterise.catalogue import (
     Coupon,
     CouponTarget,
@@ -29,7 +29,7 @@ from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError
 from sensorgen.core.version import __version__
 from sensorgen.design import materials, packs
 from sensorgen.design.design import Design
-from sensorgen.design.materials import own
+from sensorgen.design.materials import Material, own
 from sensorgen.export import machine
 from sensorgen.export.slicers.loads import load, recipe
 from sensorgen.prediction.inference import Parameter
@@ -41,6 +41,15 @@ STEPS = ("catalogue", "selection", "3MF", "profiles", "picture", "done")
 FORM = "form.yaml"
 MOST, HOURS = 12, 4.0  # coupons with the piece for lines and shorts, and print time
 _SLOWER, _CHANGE_S = 1.15, 20.0  # of a print against its flow; two tool changes of a layer [s]
+
+
+def _pair(loaded: Sequence[Material]) -> tuple[str, str]:
+    """Names of the material that conducts, and of the one that does not; refused unless there is one of each."""
+    conductors, dielectrics = ([m.name for m in loaded if m.conductor == kind] for kind in (True, False))
+    if not len(conductors) == len(dielectrics) == 1:
+        words = ", ".join(f"{m.name} ({'conducts' if m.conductor else 'does not conduct'})" for m in loaded)
+        raise BadInput(f"materials are {words or 'none'}; expected one that conducts and one that does not")
+    return conductors[0], dielectrics[0]
 
 
 @dataclass(frozen=True)
@@ -75,11 +84,7 @@ class Study:
         """
         given = packs.with_files({"materials": {str(k): name for k, name in enumerate(names)}}, folder)
         loaded = [materials.load(name, texts=given.get("own", {})) for name in given["materials"].values()]
-        pairs = [m for m in loaded if m.conductor], [m for m in loaded if not m.conductor]
-        if [len(kind) for kind in pairs] != [1, 1]:
-            said = ", ".join(f"{m.name} ({'conducts' if m.conductor else 'does not conduct'})" for m in loaded)
-            raise BadInput(f"materials are {said or 'none'}; expected one that conducts and one that does not")
-        conductor, dielectric = pairs[0][0].name, pairs[1][0].name
+        conductor, dielectric = _pair(loaded)
         return cls(plates.carrier(conductor, dielectric, printer, quality, tools or {}, folder), conductor, dielectric)
 
     @cached_property
@@ -317,9 +322,9 @@ def plan(
     folder, names = out / label, (study.conductor, study.dielectric)
     forms.refuse_filled(folder / FORM)
     step("catalogue")
-    candidates = selection.candidates(study.coupons, study.unknowns, study.targets, Meters())
+    candidates = posteriors.candidates(study.coupons, study.unknowns, study.targets, Meters())
     step("selection")
-    chosen = selection.select(candidates, count - 1, lambda chosen: study.fits(chosen, hours))
+    chosen = posteriors.select(candidates, count - 1, lambda chosen: study.fits(chosen, hours))
     coupons = named([study.coupons[k] for k in chosen])
     result = compared(prior(study.unknowns), candidates.expected(chosen, study.unknowns), study.targets)
     plate = plates.arranged(coupons, study.design)
@@ -356,12 +361,12 @@ def named(coupons: Sequence[Coupon]) -> list[Coupon]:
 
 
 def _exposed(
-    found: selection.Candidates, chosen: tuple[int, ...], coupons: Sequence[Coupon], study: Study
+    found: posteriors.Candidates, chosen: tuple[int, ...], coupons: Sequence[Coupon], study: Study
 ) -> Iterator[tuple[str, str]]:
     for k, coupon in enumerate(coupons):
         without = found.expected(chosen[:k] + chosen[k + 1 :], study.unknowns)
         wide = [
-            t.title for t in study.targets if t.goal and without.interval(t).half_width() > selection.RESERVE * t.goal
+            t.title for t in study.targets if t.goal and without.interval(t).half_width() > posteriors.RESERVE * t.goal
         ]
         if wide:
             yield coupon.name, ", ".join(wide)
@@ -437,6 +442,16 @@ class Characterised:
         return own.written(about, materials, self.findings)
 
 
+def _source_name(given: str, plate: str) -> str:
+    """Name of the source: as given, else the plate's with "lab-" before it."""
+    label = given or "lab-" + "".join(c if c.isalnum() else "-" for c in plate.lower()).strip("-")
+    if not packs.is_name("sources", label):
+        raise BadInput(f"--name {label!r}; expected lower-case letters, digits, '.' and '-', as in lab-spool7")
+    if label in materials.shipped_citations():
+        raise BadInput(f"--name {label} is a source that ships with sensorgen; expected another, as lab-spool7")
+    return label
+
+
 def read(path: Path, source: str = "", *, keep: bool = True, force: bool = False) -> Characterised:
     """Evaluate a filled-in form, and keep the values as a source.
 
@@ -457,11 +472,7 @@ def read(path: Path, source: str = "", *, keep: bool = True, force: bool = False
         The form or a name in it is wrong, or there is a source of that name; nothing was written.
     """
     form = forms.read(path)
-    label = source or "lab-" + "".join(c if c.isalnum() else "-" for c in form.plate.lower()).strip("-")
-    if not packs.is_name("sources", label):
-        raise BadInput(f"--name {label!r}; expected lower-case letters, digits, '.' and '-', as in lab-spool7")
-    if label in materials.shipped_citations():
-        raise BadInput(f"--name {label} is a source that ships with sensorgen; expected another, as lab-spool7")
+    label = _source_name(source, form.plate)
     file = own.path(label)
     if keep and not force and os.path.lexists(file):
         raise BadInput(f"{file}: there is a source {label} already; choose another --name, or --force replaces it")
@@ -487,21 +498,31 @@ def read(path: Path, source: str = "", *, keep: bool = True, force: bool = False
 
 def _findings(piece: forms.LineReadings, line_mm: float) -> Iterator[str]:
     """Line width, shortest film, smallest distance and tool offset, as far as they were read."""
-    walls = [(k, w) for k, w in enumerate(piece.walls_mm, 1) if w]
+    yield from _line_width(piece.walls_mm, line_mm)
+    yield from _smallest("film", piece.films_short, "layers")
+    yield from _smallest("distance", piece.combs_short, "lines")
+    along = [f"{axis} {value:+.2f} mm" for axis, value in zip("xy", piece.offsets_mm, strict=True) if value is not None]
+    if along:
+        yield f"dielectric's tool against the conductor's: {', '.join(along)} (+-{plates.STEP_MM / 2:g} mm)"
+
+
+def _line_width(walls_mm: Sequence[float | None], line_mm: float) -> Iterator[str]:
+    """Width of a line by walls of 1, 2, ... lines; walls that are not printed."""
+    walls = [(k, w) for k, w in enumerate(walls_mm, 1) if w]
     if len(walls) > 1:
         lines, widths = np.array(walls, float).T
         slope, over = np.polyfit(lines, widths, 1)
         differs = f"{abs(over):.3f} mm {'wider' if over > 0 else 'narrower'} than" if round(over, 3) else "as wide as"
         yield f"line width {slope:.3f} mm (set {line_mm:g}); a wall is {differs} its lines"
-    missing = [k for k, w in enumerate(piece.walls_mm, 1) if w == 0]
+    missing = [k for k, w in enumerate(walls_mm, 1) if w == 0]
     if missing:
         yield f"walls of {max(missing)} lines or fewer are not printed"
-    for what, short, unit in (("film", piece.films_short, "layers"), ("distance", piece.combs_short, "lines")):
-        tight = [k for k, found in enumerate(short, 1) if found is not None and not any(short[k - 1 :])]
-        if tight:
-            yield f"smallest {what} without a short: {tight[0]} {unit} (one piece each)"
-        elif any(short):
-            yield f"{what}: all are short; expected one that insulates"
-    along = [f"{axis} {value:+.2f} mm" for axis, value in zip("xy", piece.offsets_mm, strict=True) if value is not None]
-    if along:
-        yield f"dielectric's tool against the conductor's: {', '.join(along)} (+-{plates.STEP_MM / 2:g} mm)"
+
+
+def _smallest(what: str, short: Sequence[bool | None], unit: str) -> Iterator[str]:
+    """Smallest size from which on none is short."""
+    tight = [k for k, one in enumerate(short, 1) if one is not None and not any(short[k - 1 :])]
+    if tight:
+        yield f"smallest {what} without a short: {tight[0]} {unit} (one piece each)"
+    elif any(short):
+        yield f"{what}: all are short; expected one that insulates"

@@ -190,29 +190,35 @@ def _repaired(name: str, raw: FileBody) -> tuple[ReadBody, list[Finding]]:
     return body, findings
 
 
+def _is_sensor(edges_mm: Real) -> bool:
+    return bool((edges_mm >= _LEAST_MM).all() and (edges_mm <= _MOST_MM).all())
+
+
+def _edges(edges_mm: Real) -> str:
+    return " x ".join(f"{edge:.6g}" for edge in edges_mm)
+
+
+def _likely_units(size_mm: Real, unit: str) -> str:
+    """Units, and the sizes in them, with which it is as large as a sensor can be; "" for none."""
+    scales = mesh_files.UNITS_MM
+    sizes = [(name, size_mm * scale / scales[unit or "mm"]) for name, scale in scales.items()]
+    sizes += [("mm", size_mm / scale) for scale in scales.values()] if not unit else []
+    likely = {name: _edges(edges) for name, edges in reversed(sizes) if _is_sensor(edges)}
+    return " or ".join(f"{name} ({likely[name]} mm)" for name in scales if name in likely)
+
+
 def _sizes(bodies: Sequence[ReadBody], unit: str) -> list[Finding]:
     """A finding where the sensor is larger or smaller than one can be: its unit, given or the file's own, is wrong."""
     box = np.array([body.box_mm for body in bodies])
     low, high = box[:, 0].min(0), box[:, 1].max(0)
     size = high - low
-
-    def fits(edges: Real) -> bool:
-        return bool((edges >= _LEAST_MM).all() and (edges <= _MOST_MM).all())
-
-    def shown(edges: Real) -> str:
-        return " x ".join(f"{edge:.6g}" for edge in edges)
-
-    if fits(size):
+    if _is_sensor(size):
         return []
-    scales = mesh_files.UNITS_MM
-    sizes = [(name, size * scale / scales[unit or "mm"]) for name, scale in scales.items()]
-    sizes += [("mm", size / scale) for scale in scales.values()] if not unit else []
-    likely = {name: shown(edges) for name, edges in reversed(sizes) if fits(edges)}
-    words = " or ".join(f"{name} ({likely[name]} mm)" for name in scales if name in likely)
+    words = _likely_units(size, unit)
     hint = f"its numbers may be in {words}" if words else "no unit makes a sensor of it: look at its dimensions"
     return [
         Finding("11-size", "error", "sensor",
-                f"it is {shown(size)} mm; expected 1 to 1000 mm in x and y, from 0.05 in z",
+                f"it is {_edges(size)} mm; expected 1 to 1000 mm in x and y, from 0.05 in z",
                 f"{hint}: export it in mm, or give --unit for STL and 3MF", place_mm=tuple(low.round(6).tolist()))
     ]  # fmt: skip
 

@@ -1,5 +1,9 @@
-"""The front of a space of designs: each is discarded for a reason, or evaluated, the most promising first."""
+"""The front of a space of designs: each is discarded for a reason, or evaluated, the most promising first.
 
+Of a space that is too large to try all, NSGA-II (:func:`sample`) chooses the designs; nothing is proven beyond those.
+"""
+
+import importlib.util
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -11,12 +15,13 @@ from typing import Annotated, Any
 
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.document import Column
-from sensorgen.core.errors import SensorgenError
+from sensorgen.core.errors import NotInstalled, SensorgenError
 from sensorgen.core.parallel import Lane, open_lanes, remembered, said
+from sensorgen.workflows.moves import Candidate, Search
 from sensorgen.workflows.optimise import ladder
 from sensorgen.workflows.optimise.ladder import AT_REST, COARSE
+from sensorgen.workflows.optimise.space import Space
 from sensorgen.workflows.optimise.target import NUMBERS, Target
-from sensorgen.workflows.search import Candidate, Search
 from sensorgen.workflows.trial import Trial
 
 MARGIN = 1.5  # between a number on the coarse mesh and its best value; widened where a design shows more
@@ -358,13 +363,18 @@ def settled(found: Front, best: Candidate, key: str = "") -> tuple[Candidate, tu
         The design that :data:`RULE` chooses, and the others; ``best`` among them where another one is as good.
     """
     target = found.target
-    keys = [key, *(k for k in target.objectives if k != key)] if key else list(target.objectives)
-    group = [row for row in found.front if row is best or tied(best, row, keys[:1] if key else keys)]
-    for each in keys[1:] if key else ():
-        ahead = min(group, key=partial(worth, target, each))
-        group = [row for row in group if row is ahead or tied(ahead, row, [each])]
-    chosen = min(group, key=lambda row: (*_rule(row), worth(target, keys[0], row), row.number))
+    objectives = list(target.objectives)
+    group = _ties(found.front, best, [key] if key else objectives)
+    for other in objectives if key else ():
+        if other != key:
+            group = _ties(group, min(group, key=partial(worth, target, other)), [other])
+    chosen = min(group, key=lambda row: (*_rule(row), worth(target, key or objectives[0], row), row.number))
     return chosen, tuple(row for row in dict.fromkeys((*group, best)) if row is not chosen)
+
+
+def _ties(rows: Iterable[Candidate], best: Candidate, keys: Sequence[str]) -> list[Candidate]:
+    """Designs that equal the best in every objective, within what the models leave open."""
+    return [row for row in rows if row is best or tied(best, row, keys)]
 
 
 def worth(target: Target, key: str, row: Candidate) -> float:
@@ -377,3 +387,76 @@ def _rule(row: Candidate) -> tuple[int, int]:
     """Warnings, and layers between the electrodes as printed, negative [-]."""
     gap = value_of("gap_mm", row)
     return row.counts()[1], -round(gap.value / row.design.layers.layer_mm) if gap else 0
+
+
+POPULATION = 24  # designs of a generation
+SEED = 1
+_STEPS = 1 << 20  # of the share of a range: finer than any grid
+_IDLE = 5  # generations without a new design, after which the search ends
+_WORST = 1e30  # objective of a design that has none
+
+
+def sample(
+    target: Target, space: Space, count: int, workers: Workers = HERE, *, keep: bool = True,
+    progress: Progress = lambda *_: None,
+) -> Front:  # fmt: skip
+    """The front of so many designs, which NSGA-II chooses by the results of those before.
+
+    Each generation is checked, bounded and evaluated as by :func:`sensorgen.workflows.optimise.front.search`, against
+    all designs before: what is violated, doubts too, counts before any objective.
+
+    Parameters
+    ----------
+    target : Target
+        What the best design is to be best at.
+    space : Space
+        Its designs.
+    count : int
+        Designs to try; fewer where generations bring no new one.
+    workers, keep, progress
+        As of ``search``.
+
+    Raises
+    ------
+    NotInstalled
+        Optuna is missing.
+
+    Notes
+    -----
+    Deb et al., IEEE Trans. Evol. Comput. 6 (2002) 182; as in Optuna, with a fixed seed.
+    """
+    if importlib.util.find_spec("optuna") is None:
+        raise NotInstalled("--sample needs Optuna: pip install 'sensorgen[search]'")
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    sampler = optuna.samplers.NSGAIISampler(population_size=POPULATION, seed=SEED)
+    study = optuna.create_study(directions=["minimize"] * len(target.objectives), sampler=sampler)
+    rows: dict[tuple[object, ...], Candidate] = {}
+    idle = 0
+    with workers.opened() as opened:
+        front = Front(target, opened, keep=keep, progress=progress)
+        while len(rows) < count and idle < _IDLE:
+            before, asked = len(rows), []
+            for trial in [study.ask() for _ in range(POPULATION)]:
+                part = trial.suggest_int("part", 0, len(space.parts) - 1)
+                shares = {key: trial.suggest_int(key, 0, _STEPS - 1) / _STEPS for key in space.parts[part][1]}
+                candidate = space.at(part, shares)
+                values = tuple(candidate.values.values())
+                if values in rows or len(rows) < count:
+                    asked.append((trial, rows.setdefault(values, candidate)))
+            front.run(front.made(list(rows.values())[before:]))
+            for trial, row in asked:
+                trial.set_constraint("violated", sum(row.violated.values()))
+                study.tell(trial, _objectives(target, row))
+            idle = idle + 1 if len(rows) == before else 0
+    front.whole = space.size
+    return front
+
+
+def _objectives(target: Target, row: Candidate) -> Sequence[float]:
+    """Objectives of a design, evaluated or on the coarse mesh, the lower the better."""
+    if row.trial:
+        return [min(worth(target, key, row), _WORST) for key in target.objectives]
+    known = row.known
+    return [target.worth(key, known[key].lower) if key in known else _WORST for key in target.objectives]

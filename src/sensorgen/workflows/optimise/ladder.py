@@ -25,9 +25,8 @@ from sensorgen.prediction.print_files import NONE
 from sensorgen.prediction.query import DEFAULT, Query
 from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.sensor_model import build_sensor, piece, pressure_pa
-from sensorgen.workflows.moves import short
+from sensorgen.workflows.moves import EarlyNumber, short
 from sensorgen.workflows.optimise.target import NUMBERS
-from sensorgen.workflows.search import EarlyNumber
 from sensorgen.workflows.trial import Numbers, Trial, trial
 
 AT_REST = frozenset({"gap_mm", "capacitance_pf", "top_electrode_ohm", "bottom_electrode_ohm"})

@@ -10,10 +10,10 @@ from sensorgen.core.display import Displayed
 from sensorgen.core.document import Cell, Column, Part, Table, comma_separated, shown
 from sensorgen.core.findings import Verdict
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
+from sensorgen.workflows.moves import Candidate
 from sensorgen.workflows.optimise.front import RULE, Binding, Front, Reason, tied, value_of
 from sensorgen.workflows.optimise.front import worth as worth_of
 from sensorgen.workflows.optimise.target import NUMBERS, OURS, Target
-from sensorgen.workflows.search import Candidate
 
 _LISTED = 8  # designs, of those that are tied
 _SAME = 1e-9  # relative difference of numbers that are equal but for rounding
@@ -61,6 +61,10 @@ class Chosen:
     tied: tuple[int, ...] = ()
     uninformed: dict[str, float] = field(default_factory=dict)
     body: str = ""
+
+    def mark(self) -> str:
+        """Mark in the table of the front."""
+        return ">" if self.leads else "=" if self.tied else ""
 
     def senses(self, name: str) -> bool:
         """False for an error that is that of no reading."""
@@ -199,7 +203,7 @@ class Optimised(Displayed):
             *(Column(NUMBERS[n].words, NUMBERS[n].unit, digits=3, key=n) for n in names), Column("verdict"),
         )  # fmt: skip
         cells = (
-            (c.number, ">" if c.leads else "=" if c.tied else "", *(c.values.get(k) for k in keys),
+            (c.number, c.mark(), *(c.values.get(k) for k in keys),
              *(c.cell(n) for n in names), c.verdict)
             for c in self.front
         )  # fmt: skip
@@ -307,26 +311,29 @@ def _numbers(one: Recommended) -> Table:
 
 def result(name: str, found: Front, recommended: tuple[Recommended, ...] = ()) -> Optimised:
     """A search as its answer."""
-    front = {row.number for row in found.front}
-    ahead, keys = leads(found), list(found.target.objectives)
+    ahead = leads(found)
+    ties = dict(_ties(found, ahead))
     leading = {row.number for row in ahead}
-    ties = {
-        row.number: tuple(each.number for each in ahead if tied(each, row, keys))
-        for row in found.front
-        if row.number not in leading
-    }
     designs = tuple(
         chosen(found.target, row, leads=row.number in leading, ties=ties.get(row.number, ())) for row in found.rows
     )
-    nearest = None if front else found.nearest()
+    nearest = None if found.front else found.nearest()
     return Optimised(
         name, len(found.rows), len(found.evaluated),
         {k: goal if isinstance(goal, str) else f"near {goal.near:g}" for k, goal in found.target.objectives.items()},
         tuple(found.reasons()), tuple(designs[row.number - 1] for row in found.front),
         designs, found.margin, found.largest or None, recommended, designs[nearest.number - 1] if nearest else None,
-        () if front else tuple(found.binding()), tuple(_remarks(found)),
+        () if found.front else tuple(found.binding()), tuple(_remarks(found)),
         found.whole,
     )  # fmt: skip
+
+
+def _ties(found: Front, ahead: Sequence[Candidate]) -> Iterator[tuple[int, tuple[int, ...]]]:
+    """Designs of the front that do not lead, each with those that do and equal it in every objective."""
+    keys = list(found.target.objectives)
+    for row in found.front:
+        if row not in ahead:
+            yield row.number, tuple(each.number for each in ahead if tied(each, row, keys))
 
 
 def _remarks(found: Front) -> Iterator[str]:
@@ -343,14 +350,15 @@ def _remarks(found: Front) -> Iterator[str]:
 
 def chosen(target: Target, row: Candidate, *, leads: bool = False, ties: tuple[int, ...] = ()) -> Chosen:
     """A design of the space as plain data."""
-    trial, design = row.trial, row.made
+    trial = row.trial
+    name, identity = (row.made.name, row.made.id()) if row.made else ("", "")
+    verdict, body = (trial.verdict, trial.body) if trial else ("", "")
     wanted = dict.fromkeys((*target.objectives, *target.limits, "capacitance_pf"))
     values = {k: value_of(k, row) for k in wanted}
     uninformed = {k: limit for k in values if trial and (limit := NUMBERS[k].uninformed(trial)) < inf}
     return Chosen(
-        row.number, dict(row.values), design.name if design else "", design.id() if design else "",
-        row.discarded, tuple(row.violated), trial.verdict if trial else "",
-        {key: value for key, value in values.items() if value}, leads, ties, uninformed, trial.body if trial else "",
+        row.number, dict(row.values), name, identity, row.discarded, tuple(row.violated), verdict,
+        {key: value for key, value in values.items() if value}, leads, ties, uninformed, body,
     )  # fmt: skip
 
 

@@ -1,7 +1,12 @@
 """From a target's file to its answer: table, page, and the files of the designs to print."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, replace
+from functools import partial
+from math import inf
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from sensorgen.analysis.plots import pages
@@ -9,13 +14,21 @@ from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, PINK, Axis, Curv
 from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.bounds import Bounds
-from sensorgen.core.errors import within
-from sensorgen.workflows.optimise.front import HERE, Progress, Workers, search
-from sensorgen.workflows.optimise.recommend import recommended
-from sensorgen.workflows.optimise.result import Chosen, Optimised, Recommended, result
-from sensorgen.workflows.optimise.sample import sample
-from sensorgen.workflows.optimise.space import Space, candidates, space
-from sensorgen.workflows.optimise.target import NUMBERS, load
+from sensorgen.core.errors import SensorgenError, Unprintable, within
+from sensorgen.core.parallel import in_parallel
+from sensorgen.design.design import Design, make
+from sensorgen.design.tip import EVEN, TOPS
+from sensorgen.design.walls import rules
+from sensorgen.prediction.mesh_ladder import ROUGH
+from sensorgen.workflows.build import build
+from sensorgen.workflows.moves import Candidate, EarlyNumber
+from sensorgen.workflows.optimise import ladder
+from sensorgen.workflows.optimise.front import HERE, Front, Progress, Workers, sample, search, settled, value_of, worth
+from sensorgen.workflows.optimise.result import Chosen, ObjectiveSpread, Optimised, Recommended, chosen, leads, result
+from sensorgen.workflows.optimise.space import Space, candidates, grid_mm, space
+from sensorgen.workflows.optimise.target import NUMBERS, Target, load
+from sensorgen.workflows.slice import slice_design
+from sensorgen.workflows.trial import trial
 
 
 def optimise(
@@ -31,7 +44,7 @@ def optimise(
     out : Path
         Folder of all files.
     count : int
-        Designs to try, chosen by :func:`sensorgen.workflows.optimise.sample.sample`; 0 for all of the space.
+        Designs to try, chosen by :func:`sensorgen.workflows.optimise.front.sample`; 0 for all of the space.
     workers, keep, progress
         As of :func:`sensorgen.workflows.optimise.front.search`.
     built, sliced : bool
@@ -46,7 +59,7 @@ def optimise(
     """
     path = Path(word)
     target, name = load(word, tip), path.stem
-    chosen: tuple[Recommended, ...] = ()
+    recommendations: tuple[Recommended, ...] = ()
     with within(str(path)):
         designs = space(target, path.parent) if count else candidates(target, path.parent)
     with workers.opened() as opened:
@@ -55,10 +68,10 @@ def optimise(
         else:
             found = search(target, designs, opened, keep=keep, progress=progress)
         if built and found.front:
-            chosen = recommended(
+            recommendations = recommended(
                 name, found, out, opened, keep=keep, sliced=sliced, step=lambda role: progress(role, 0, 1)
             )  # fmt: skip
-    answer = result(name, found, chosen)
+    answer = result(name, found, recommendations)
     store.replace(out / f"{name}.html", page(answer).encode())
     store.replace(out / f"{name}.json", document.to_json(answer).encode())
     store.replace(out / f"{name}.csv", "".join(answer.csv()).encode())
@@ -111,3 +124,151 @@ def _points(name: str, colour: str, shown: list[Chosen], across: str, up: str) -
         high=[b.model.upper for b in x], colour=colour,
         text=[f"{c.number}: " + ", ".join(f"{k} {v}" for k, v in c.values.items()) for c in shown],
     )  # fmt: skip
+
+
+Step = Callable[[str], None]
+
+
+def recommended(
+    name: str, found: Front, out: Path, workers: Workers = HERE, *, keep: bool = True, sliced: bool = True,
+    step: Step = lambda _: None,
+) -> tuple[Recommended, ...]:  # fmt: skip
+    """Write the files of the designs to print into ``out``.
+
+    Parameters
+    ----------
+    name : str
+        Of the target; the designs' names begin with it.
+    found : Searched
+        The search.
+    out : Path
+        Folder for the designs' folders.
+    workers, keep
+        As of :func:`sensorgen.workflows.optimise.front.search`.
+    sliced : bool
+        Slice each with PrusaSlicer, where it is installed.
+    step : callable
+        Called with the next step.
+    """
+    target, rows = found.target, leads(found)
+    best = {
+        f"best {key.rpartition('_')[0]}": (min(rows, key=partial(worth, target, key)), key)
+        for key in list(target.objectives)[:2]
+    }
+    made: dict[int, tuple[Candidate, Recommended]] = {}
+    for role, (row, key) in (best | {"balanced": (rows[0], "")}).items():
+        row, others = settled(found, row, key)
+        if row.number in made:
+            before = made[row.number][1]
+            ties = tuple(dict.fromkeys((*before.ties, *(other.number for other in others))))
+            made[row.number] = row, replace(before, role=f"{before.role}, {role}", ties=ties)
+            continue
+        name_ = f"{name}-{role.replace('best ', '').replace('_', '-')}"
+        one = Recommended(role, replace(chosen(target, row, leads=True), name=name_))
+        made[row.number] = row, replace(one, ties=tuple(other.number for other in others))
+    with workers.opened() as opened:
+        step("tolerances")
+        robust = _robust(target, [row for row, _ in made.values()], opened, keep=keep)
+        works = [(replace(one, robust=robust[n]), target, row.design, out, sliced) for n, (row, one) in made.items()]
+        step("files")
+        lanes = () if opened.cluster else opened.lanes  # files are written by this computer
+        written = dict(in_parallel(_built, works, opened.jobs, lanes=lanes,
+                                   lost=lambda k, reason: replace(works[k][0], slicer=reason)))  # fmt: skip
+    return tuple(written[k] for k in range(len(works)))
+
+
+def _robust(
+    target: Target, rows: Sequence[Candidate], workers: Workers, *, keep: bool
+) -> dict[int, dict[str, ObjectiveSpread]]:
+    """Of designs by number: objectives on the coarse mesh, over walls of slicers and lengths in the plane.
+
+    Under the top that is the worst of the design itself: another one seldom overtakes it, and takes as long.
+    """
+    keys, query = [key for key in target.objectives if key in ladder.COARSE], target.query()
+    pressed = [key for key in keys if key not in ladder.AT_REST]
+    inputs, owners = list[tuple[Any, ...]](), list[int]()
+    for row in rows:
+        top = max(TOPS, key=partial(_under, target, row.design, pressed[0])) if pressed else EVEN
+        designs = [(row.design, ""), *((row.design, rule) for rule in rules(None))]
+        designs += [(design, rules(None)[0]) for design in within_tolerance(target, row.design)]
+        inputs += [(design, query, bool(pressed), rule, (top,), ROUGH) for design, rule in designs]
+        owners += [row.number] * len(designs)
+    numbers: dict[int, list[dict[str, EarlyNumber]]] = {row.number: [] for row in rows}
+    for k, one in sorted(workers.results(ladder.known, inputs, "lost", keep=keep)):  # first its own walls
+        numbers[owners[k]].append({} if isinstance(one, str) else one)
+    return {row.number: dict(_spreads(target, keys, row, numbers[row.number])) for row in rows}
+
+
+def _under(target: Target, design: Design, key: str, top: str) -> float:
+    """An objective under a top, the lower the better, as solved for the search already."""
+    numbers = ladder.known(design, target.query(), True, tops=(top,))
+    return target.worth(key, numbers[key].lower) if key in numbers else -inf
+
+
+def within_tolerance(target: Target, design: Design) -> Iterator[Design]:
+    """The design with each length in the plane that is varied changed by the tolerance to both sides."""
+    data = design.model_dump(mode="json", exclude_unset=True, exclude={"name"})
+    for name, value in asdict(design.params).items():
+        if not (name.endswith("_mm") and name in target.parameters and target.tolerance_mm):
+            continue
+        if grid_mm(design, name) != design.layers.layer_mm:
+            for sign in (-1, 1):
+                parameters = data.get("parameters", {}) | {name: value + sign * target.tolerance_mm}
+                with suppress(SensorgenError):  # no such design
+                    yield make(data | {"parameters": parameters})
+
+
+def _spreads(
+    target: Target, keys: Sequence[str], row: Candidate, numbers: Sequence[dict[str, EarlyNumber]]
+) -> Iterator[tuple[str, ObjectiveSpread]]:
+    """The value of each objective, changed by the factor that the coarse mesh has from the first of ``numbers`` on."""
+    for key in keys:
+        own = value_of(key, row)
+        values = [(one[key].lower + one[key].upper) / 2 for one in numbers if key in one]
+        if own and key in numbers[0]:
+            varied = [own.value * value / values[0] for value in values]
+            ends = max((own.lower, own.upper), key=partial(target.worth, key))
+            yield (
+                key,
+                ObjectiveSpread(
+                    own.value, median(varied[1:] or varied), max(varied, key=partial(target.worth, key)), ends
+                ),
+            )
+
+
+def _built(one: Recommended, target: Target, design: Design, out: Path, sliced: bool) -> Recommended:
+    """With its files, and its numbers by a real slicer, whose file decides the build, too."""
+    design = make(design.model_dump(mode="json", exclude_defaults=True) | {"name": one.design.name})
+    one, folder = _with_gcode(one, design, out) if sliced else one, out / design.name
+    try:
+        built = build(design, out, cad=False)
+    except Unprintable as error:
+        return replace(one, verdict="CHANGE", slicer=str(error), sliced=None)
+    store.replace(out / f"{design.name}.yaml", _yaml(design))
+    one = replace(one, folder=str(folder), verdict=built.verdict)
+    if one.sliced is None:
+        return one
+    try:
+        tried = trial(design, target.query(), folder=folder, drawn=False)
+    except SensorgenError as error:
+        return replace(one, slicer=str(error), sliced=None)
+    values = {key: NUMBERS[key].of(tried.printed, tried.toolpath) for key in target.objectives}
+    return replace(one, sliced={key: value for key, value in values.items() if value and key in one.design.numbers})
+
+
+def _with_gcode(one: Recommended, design: Design, out: Path) -> Recommended:
+    """With a file of PrusaSlicer and no numbers yet; or why there is none, unless the build says that."""
+    try:
+        slicer = slice_design(design, out, "prusa").slicer
+    except Unprintable:
+        return one
+    except SensorgenError as error:
+        return replace(one, slicer=str(error))
+    return replace(one, sliced={}, slicer=f"PrusaSlicer {slicer.version}")
+
+
+def _yaml(design: Design) -> bytes:
+    import yaml
+
+    data = design.model_dump(mode="json", exclude_defaults=True)
+    return str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True)).encode()

@@ -9,9 +9,8 @@ from typing import Any
 
 from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
 from sensorgen.design.design import Design, make, with_own_files
-from sensorgen.workflows.moves import Value, lengths, with_values
+from sensorgen.workflows.moves import Candidate, Value, lengths, with_values
 from sensorgen.workflows.optimise.target import Range, Target
-from sensorgen.workflows.search import Candidate
 
 MOST = 20_000  # designs: their checks alone take half an hour on two cores
 _NEAR = 1e-9
@@ -81,19 +80,25 @@ def candidates(target: Target, folder: Path = Path()) -> list[Candidate]:
             f"{whole.size:.3g} designs; expected at most {MOST}: give a larger step, narrower ranges or fewer choices "
             f"({longest[1]} alone has {longest[0]} values), or --sample 400, which proves nothing"
         )
-    found = [whole.candidate(chosen | values) for chosen, inside in whole.parts for values in _combinations(inside)]
+    every = [whole.candidate(chosen | values) for chosen, inside in whole.parts for values in _combinations(inside)]
     for key, given in target.parameters.items():
-        for value in [] if isinstance(given, Range) else given:
-            own = [candidate for candidate in found if candidate.values.get(key) == value]
-            if own and not any(candidate.made for candidate in own):
-                raise BadInput(f"parameters.{key}: no design can have {value!r}: {own[0].discarded}")
-    return found
+        if not isinstance(given, Range):
+            _refuse_impossible(key, given, every)
+    return every
+
+
+def _refuse_impossible(key: str, values: list[Value], every: list[Candidate]) -> None:
+    """Refuse a value that no design can have."""
+    for value in values:
+        own = [candidate for candidate in every if candidate.values.get(key) == value]
+        if own and not any(candidate.made for candidate in own):
+            raise BadInput(f"parameters.{key}: no design can have {value!r}: {own[0].discarded}")
 
 
 def space(target: Target, folder: Path = Path()) -> Space:
     """The space of a target, of any size; raises as :func:`candidates`."""
-    base = dict(target.design) if isinstance(target.design, Mapping) else {}
-    base = with_own_files({k: v for k, v in base.items() if k != "name"}, folder)
+    design = target.design if isinstance(target.design, Mapping) else {}
+    base = with_own_files({k: v for k, v in design.items() if k != "name"}, folder)
     known = frozenset(asdict(make(base).params))
     _refuse_unknown(target, known)
     # the grid of a length follows from quality, printer and nozzle: those are chosen first
@@ -104,14 +109,17 @@ def space(target: Target, folder: Path = Path()) -> Space:
         for chosen in _combinations({k: _listed(v) for k, v in outer.items()})
     ) + tuple(({}, {k: [v] for k, v in one.items()}) for one in target.also))  # fmt: skip
     if not whole.size:
-        empty = sorted(
-            {k for _, inside in whole.parts for k, values in inside.items() if not values}
-            | {k for k, v in outer.items() if not _listed(v)}
-        )
         raise BadInput(
-            f"no printable value of {', '.join(empty)} in its range: expected a whole layer or half line in it"
+            f"no printable value of {', '.join(_empty(whole, outer))} in its range: expected a whole layer or half "
+            "line in it"
         )
     return whole
+
+
+def _empty(whole: Space, outer: Mapping[str, Range | list[Value]]) -> list[str]:
+    """Parameters without a printable value."""
+    inner = {k for _, inside in whole.parts for k, values in inside.items() if not values}
+    return sorted(inner | {k for k, v in outer.items() if not _listed(v)})
 
 
 def _refuse_unknown(target: Target, known: frozenset[str]) -> None:

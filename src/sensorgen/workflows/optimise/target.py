@@ -186,13 +186,7 @@ class Target(Strict):
     @model_validator(mode="after")
     def _makes_sense(self) -> "Target":
         for key in (*self.objectives, *self.limits):
-            word = next((w for w in _NOT_PREDICTED if key.startswith(w)), None)
-            if word:
-                raise ValueError(f"{key} {_NOT_PREDICTED[word]}")
-            if key not in NUMBERS:
-                raise ValueError(str(UnknownName("number", key, NUMBERS)))
-            if NUMBERS[key].of_path and not self.slicer:
-                raise ValueError(f"{key} is known of G-code alone: add slicer: prusa")
+            self._refuse_number(key)
         for name in self.refuse_warnings:
             if name not in RULES:
                 raise ValueError(f"refuse_warnings: {UnknownName('rule', name, RULES)}")
@@ -203,6 +197,16 @@ class Target(Strict):
             if isinstance(goal, Near) and limit.beyond(goal.near):
                 raise ValueError(f"{key}: near {goal.near:g} contradicts its limit {limit.least:g} to {limit.most:g}")
         return self
+
+    def _refuse_number(self, key: str) -> None:
+        """Refuse a number that is not predicted, that does not exist, or that is known of G-code alone."""
+        for word, reason in _NOT_PREDICTED.items():
+            if key.startswith(word):
+                raise ValueError(f"{key} {reason}")
+        if key not in NUMBERS:
+            raise ValueError(str(UnknownName("number", key, NUMBERS)))
+        if NUMBERS[key].of_path and not self.slicer:
+            raise ValueError(f"{key} is known of G-code alone: add slicer: prusa")
 
     def query(self) -> Query:
         """Question about every design."""
@@ -234,10 +238,12 @@ class Target(Strict):
         found |= {f"doubt: {d}": 1.0 for d in trial.doubts if not self.accepts(d)}
         for key, limit in self.limits.items():
             value = NUMBERS[key].of(trial.printed, trial.toolpath)
-            if value is None or limit.beyond(value.value):
-                found[f"limit {key}"] = 1.0 if value is None else limit.beyond(value.value)
-        unknown = (k for k in self.objectives if NUMBERS[k].of(trial.printed, trial.toolpath) is None)
-        return found | ({f"unknown {key}": 1.0 for key in unknown} if trial.status == "predicted" else {})
+            if beyond := 1.0 if value is None else limit.beyond(value.value):
+                found[f"limit {key}"] = beyond
+        if trial.status == "predicted":
+            unknown = (k for k in self.objectives if NUMBERS[k].of(trial.printed, trial.toolpath) is None)
+            found |= {f"unknown {key}": 1.0 for key in unknown}
+        return found
 
     def accepts(self, doubt: str) -> bool:
         """Test whether there is no doubt, or an accepted one."""
