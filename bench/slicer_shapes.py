@@ -10,7 +10,7 @@ import time
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design import design, packs
-from sensorgen.prediction.slices import slice_now
+from sensorgen.prediction.new_slice import slice_now
 from slicers import NEWER, RESULTS
 
 PROGRAMS = (("prusa", ""), ("prusa", str(NEWER / "prusa-slicer")), ("cura", ""), ("cura", str(NEWER / "CuraEngine")))

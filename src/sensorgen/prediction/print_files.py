@@ -22,7 +22,7 @@ from sensorgen.export.slicers import PROGRAMS, SLICERS
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
-    from sensorgen.prediction.slices import SliceReport
+    from sensorgen.prediction.new_slice import SliceReport
 
 Step = Callable[[str], None]
 VARIABLE = "SENSORGEN_SLICER"  # environment: prusa, cura, or none for estimates; the first that is installed if not set
@@ -43,7 +43,7 @@ class PrintFile:
     @cached_property
     def report(self) -> "SliceReport":
         """The report about the file."""
-        from sensorgen.prediction.slices import adapter
+        from sensorgen.prediction.new_slice import adapter
 
         return adapter().validate_python(self.record)
 
@@ -132,7 +132,7 @@ def _sliced(design: Design, slicer: str, program: str, question: dict[str, Any],
     """A design sliced now or before."""
 
     def work() -> dict[str, Any]:
-        from sensorgen.prediction.slices import slice_now
+        from sensorgen.prediction.new_slice import slice_now
 
         sliced = slice_now(design, slicer, program=program, time_limit_s=_LIMIT_S, step=step)
         return {"report": sliced.record(), "gcode": b64encode(zlib.compress(sliced.content, 1)).decode()}
@@ -167,7 +167,7 @@ def in_folder(design: Design, folder: Path | None = None) -> PrintFile | None:
     folder = folder or OUT / design.name
     if not (os.path.isdir(folder) and any(folder.glob("*.gcode.json"))):  # noqa: PTH112 - a name too long
         return None
-    from sensorgen.prediction.slices import adapter
+    from sensorgen.prediction.new_slice import adapter
 
     for note in sorted(folder.glob("*.gcode.json")):
         try:

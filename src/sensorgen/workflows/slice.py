@@ -17,8 +17,9 @@ from sensorgen.design.walls import rule
 from sensorgen.export.gcode.results import FileNeeds
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step
+from sensorgen.prediction.new_slice import SliceReport, slice_now
 from sensorgen.prediction.print_files import NONE, PrintFile
-from sensorgen.prediction.slices import PrintReview, SliceReport, combined, of_own_machine, reviewed, slice_now
+from sensorgen.prediction.slices import PrintReview, combined, of_own_machine, reviewed
 from sensorgen.workflows import compensation
 from sensorgen.workflows.compensation import Adjustment
 

@@ -14,9 +14,10 @@ from sensorgen.design.design import Design
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE, FORCE_SHARE, GUESS
+from sensorgen.prediction.new_slice import SliceReport
 from sensorgen.prediction.query import DEFAULT, Query
 from sensorgen.prediction.results import Prediction, caption_of, resolved
-from sensorgen.prediction.slices import PrintReview, SliceReport, reviewed
+from sensorgen.prediction.slices import PrintReview, reviewed
 
 
 @dataclass(frozen=True)

@@ -187,7 +187,7 @@ class Problem:
         """Forces of all elements, and their stiffness on the free displacements; the last ones are kept."""
         if not (self._last and self._last[0][0] is local):
             empty, inside, place = self.pattern
-            force = np.bincount(self.elements.freedoms.ravel(), local.force.ravel(), len(self.load))
+            force = np.bincount(self.elements.freedoms.ravel(), local.force.ravel(), len(self.load)).astype(float)
             data = np.bincount(place, local.stiffness.ravel()[inside], empty.nnz)
             self._last[:] = [(local, force, csr_matrix((data, empty.indices, empty.indptr), empty.shape))]
         return self._last[0]
