@@ -29,8 +29,8 @@ def test_values_of_a_region_are_those_of_its_crossings(model):
     kpa[1, 1, 0] = np.nan
     maps = PressureMaps(model, "by hand", np.arange(2.0), kpa, np.ones_like(kpa))
     found = {key: values.tolist() for key, values in maps.regions.items()}
-    assert found["left_force_n"] == pytest.approx([15.0, 5.0])  # of 10 x 10 mm each
-    assert found["left_mean_kpa"] == pytest.approx([15.0, 5.0])  # r2c1 as what lies around it: 0
+    assert found["left_force_n"] == pytest.approx([15.0, 5.0], abs=0.01)  # of 10 x 10 mm each
+    assert found["left_mean_kpa"] == pytest.approx([15.0, 5.0], abs=0.01)  # r2c1 as what lies around it: 0
     assert found["left_peak_kpa"] == [100.0, 50.0]
     assert found["left_area_mm2"] == pytest.approx([200.0, 100.0])
     assert found["left_undetermined"] == [0, 1]

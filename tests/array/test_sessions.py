@@ -132,6 +132,28 @@ def test_noise_is_not_widened_as_scatter_of_sessions_is(count):
     assert (np.abs(mean - kpa) < half)[1000:].mean() == pytest.approx(0.9, abs=0.02)
 
 
+def test_noise_of_readings_does_not_flatten_the_law():
+    """Least squares take a gain for g / (1 + n s^2 / sum x^2), s the noise: here 0.79 g, and the mean over elements."""
+    count, zeros, s, gain = 100, 400, 4.0, 2.0
+    kpa = np.r_[np.zeros(zeros), np.tile(np.linspace(10, 60, 6), 10)]
+    x = (kpa / gain)[:, None] + s * np.random.default_rng(5).normal(size=(len(kpa), count))
+    none, loaded = np.full(len(kpa), np.nan), kpa / gain
+    one = ArraySession("s", 0.0, np.arange(len(kpa)) / 50, x, kpa == 0, np.tile(kpa[:, None], count), none)
+    factor = 1 / (1 + len(kpa) * s**2 / (loaded @ loaded))
+    plain = [(kpa @ of) / (of @ of) for of in (x - one.tare).T]
+    assert np.mean(plain) == pytest.approx(gain * factor, rel=0.02)
+    law = law_of([one], LawForm(powers=1))
+    assert (law.at[:, 0] / law.scale).mean() == pytest.approx(gain, rel=0.01)
+
+
+def test_terms_of_noisy_readings_are_right_on_average():
+    """Less half their bend by s^2, by 20-point Gauss-Hermite quadrature over the noise."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(20)
+    x, s, form = np.full((20, 1), 0.7) + 0.3 * nodes[:, None], 0.3, LawForm()
+    terms = form.basis(x, np.arange(20.0)) - s**2 / 2 * form.derivatives(x)[1]
+    assert (weights / weights.sum()) @ terms[:, 0] == pytest.approx(0.7 ** np.arange(1, 4))
+
+
 def test_an_element_without_data_takes_the_print_s_gain():
     """Mean and spread over the print, as of any hierarchical prior: 2.06 +- 0.11 of the other four."""
     known = made(loads(40, 2), noise=0.05)

@@ -30,6 +30,7 @@ _ROUNDS = 2  # of laws and drift in turn
 _EFFECTIVE = 20.0  # at least, samples of a session
 _RESPONDS = 0.5  # share of the variance of a reference that a live element's reading explains
 _N_PER_KPA_MM2 = 1e-3
+_PART = 0.9  # of what an element's readings tell, at most, that is taken for noise
 _LONG_S = 5.0  # from a frame to the next: longer is doubtful
 
 
@@ -142,6 +143,11 @@ class ArraySession:
         return _mean(self.reading[self.unloaded])
 
     @cached_property
+    def noise(self) -> Real:
+        """Standard deviation of white noise, by differences of successive unloaded readings, (n,); 0 of one alone."""
+        return np.asarray(np.sqrt(np.nan_to_num(_mean(np.diff(self.reading[self.unloaded], axis=0) ** 2)) / 2))
+
+    @cached_property
     def weight(self) -> float:
         """Share of the frames that are independent, by the correlation of one reference with the next [-]."""
         known = self.force_n if np.isfinite(self.force_n).any() else _mean(self.pressure_kpa.T)
@@ -246,6 +252,12 @@ class LawForm:
         terms += [lagged(x, time_s, self.tau_s, past)] if self.tau_s else []
         return np.stack([*terms, *([behind(x, self.play, past)] if self.play else [])], -1)
 
+    def derivatives(self, x: Real) -> Real:
+        """First and second derivatives of the terms by the reading, those of the past 0, (2, k, n, terms)."""
+        power, x = np.arange(1 if self.tared else 0, self.powers + 1), x[:, :, None]
+        found = np.stack([power * x ** np.maximum(power - 1, 0), power * (power - 1) * x ** np.maximum(power - 2, 0)])
+        return np.pad(found, [(0, 0)] * 3 + [(0, bool(self.tau_s) + bool(self.play))])
+
     def words(self) -> str:
         """The form in words."""
         parts = [f"{('', 'straight', 'square', 'cubic')[self.powers]}", *(["tare"] if self.tared else [])]
@@ -260,6 +272,7 @@ class Sums:
 
     day: float
     gram: Real  # (n, q, q)
+    noise: Real  # (n, q, q), part of it that is noise of the readings
     cross: Real  # (n, q)
     square: Real  # (n,)
     count: Real  # (n,)
@@ -277,13 +290,17 @@ def sums_of(session: ArraySession, form: LawForm, scale: float) -> Sums:
     known = np.isfinite(session.pressure_kpa) & np.isfinite(session.reading)
     known &= np.isfinite(session.tare) | (not form.tared)
     w, y = session.weight, np.where(known, session.pressure_kpa, 0.0)
-    some = known[:, :, None] * phi
+    x, sigma = session.reading - (session.tare if form.tared else 0.0), session.noise[:, None] / scale
+    slopes, bends = form.derivatives(np.nan_to_num(x) / scale)
+    # Noise adds sigma^2 / 2 of its bend to a term, and the product of slopes to that of two (Fuller 1987, section 1.2)
+    some, slopes = (known[:, :, None] * each for each in (phi - sigma**2 / 2 * bends, sigma * slopes))
     by_element = some.transpose(1, 2, 0)
     gram, cross = w * by_element @ some.transpose(1, 0, 2), w * (by_element @ y.T[:, :, None])[:, :, 0]
+    noise = w * slopes.transpose(1, 2, 0) @ slopes.transpose(1, 0, 2)
     total = np.flatnonzero(np.isfinite(session.force_n))
     total = total[:: max(1, round(1 / w))]
     rows = phi[total] * session.area_mm2 * _N_PER_KPA_MM2
-    return Sums(session.day, gram, cross, w * (y**2).sum(0), w * known.sum(0), rows, session.force_n[total])
+    return Sums(session.day, gram, noise, cross, w * (y**2).sum(0), w * known.sum(0), rows, session.force_n[total])
 
 
 def features(session: ArraySession, form: LawForm, scale: float, tare: "Real | None" = None) -> Real:
@@ -334,9 +351,9 @@ class ElementLaw:
     def slopes(self, session: ArraySession, tare: "Real | None" = None) -> Real:
         """Slope of the pressure by the reading, past apart, (k, n); that at rest of a missing one [kPa per unit]."""
         zero = (session.tare if tare is None else tare) if self.form.tared else 0.0
-        x, first = np.nan_to_num(session.reading - zero) / self.scale, 0 if self.form.tared else 1
-        rates = (k * self.at[:, first + k - 1] * x ** (k - 1) for k in range(1, self.form.powers + 1))
-        return np.asarray(np.exp(self.drift * (session.day - self.day)) / self.scale * sum(rates))
+        rates = self.form.derivatives(np.nan_to_num(session.reading - zero) / self.scale)[0]
+        gain = np.exp(self.drift * (session.day - self.day))
+        return np.asarray(gain / self.scale * np.einsum("knq,nq->kn", rates, self.at))
 
 
 def scale_of(sessions: Sequence[ArraySession], form: LawForm) -> float:
@@ -353,8 +370,10 @@ def _span(x: Real) -> Real:
 
 def responding(sums: Sequence[Sums]) -> Mask:
     """Elements whose readings explain half of their reference or more; all of those without a reference."""
-    gram, cross, square, count = (sum(getattr(s, name) for s in sums) for name in ("gram", "cross", "square", "count"))
-    ridge = 1e-9 * np.einsum("nqq->n", gram)[:, None, None] * np.eye(gram.shape[1]) + 1e-12 * np.eye(gram.shape[1])
+    gram, noise, cross, square, count = (
+        sum(getattr(s, name) for s in sums) for name in ("gram", "noise", "cross", "square", "count")
+    )
+    ridge = noise + (1e-9 * np.einsum("nqq->n", gram)[:, None, None] + 1e-12) * np.eye(gram.shape[1])
     explained = np.einsum("nq,nq->n", cross, np.linalg.solve(gram + ridge, cross[:, :, None])[:, :, 0])
     return np.asarray((count == 0) | (explained > _RESPONDS * square))
 
@@ -377,7 +396,7 @@ def learnt(sums: Sequence[Sums], form: LawForm, scale: float, alive: Mask) -> El
 
 def _drift(sums: Sequence[Sums], days: Real, at: Real) -> tuple[float, float]:
     """Rate of ln of the gain by days, of the gains of each session, and its standard error [1/d]."""
-    size = np.array([np.einsum("nq,nqr,nr->", at, s.gram, at) + s.total(at) @ s.total(at) for s in sums])
+    size = np.array([np.einsum("nq,nqr,nr->", at, s.gram - s.noise, at) + s.total(at) @ s.total(at) for s in sums])
     along = np.array([np.einsum("nq,nq->", at, s.cross) + s.total(at) @ s.force for s in sums])
     ln = np.log(np.maximum(along / np.maximum(size, 1e-30), 0.1))
     off, away = ln - ln.mean(), days - days.mean()
@@ -388,13 +407,17 @@ def _drift(sums: Sequence[Sums], days: Real, at: Real) -> tuple[float, float]:
 
 def _expected(sums: Sequence[Sums], gains: Real, alive: Mask) -> tuple[Real, Real]:
     """Means and covariances of the parameters of each element."""
-    gram = sum(g**2 * s.gram for g, s in zip(gains, sums, strict=True))
+    gram, by_noise = (
+        sum(g**2 * getattr(s, name) for g, s in zip(gains, sums, strict=True)) for name in ("gram", "noise")
+    )
     cross = sum(g * s.cross for g, s in zip(gains, sums, strict=True))
     square, count = (sum(getattr(s, name) for s in sums) for name in ("square", "count"))
     rows = np.concatenate([g * s.rows for g, s in zip(gains, sums, strict=True)]) * alive[None, :, None]
     force = np.concatenate([s.force for s in sums])
     (n, q), use = cross.shape, alive & (count > 0)
-    gram, cross = gram * use[:, None, None], cross * use[:, None]
+    raw, cross, ridge = gram * use[:, None, None], cross * use[:, None], (1e-9 * gram.max() + 1e-12) * np.eye(q)
+    share = np.linalg.eigvals(np.linalg.solve(raw + ridge, by_noise)).real.max(1)  # less than all, or none is left
+    gram = raw - by_noise * (use * np.minimum(1.0, _PART / np.maximum(share, 1e-30)))[:, None, None]
     even = rows.sum(1)
     start = np.linalg.lstsq(gram.sum(0) + even.T @ even, cross.sum(0) + even.T @ force, rcond=None)[0]
     mean, prior = start, np.diag(start**2 + 1e-12) + 1e-9 * float(start @ start) * np.eye(q)
@@ -411,8 +434,8 @@ def _expected(sums: Sequence[Sums], gains: Real, alive: Mask) -> tuple[Real, Rea
         off = at[alive] - mean
         mean = at[alive].mean(0)
         prior = (spread[alive] + off[:, :, None] * off[:, None, :]).mean(0) + 1e-12 * np.eye(q)
-        left = square - 2 * np.einsum("nq,nq->n", at, cross) + np.einsum("nq,nqr,nr->n", at, gram, at)
-        left = (left + np.einsum("nqr,nrq->n", gram, spread)) * use
+        left = square - 2 * np.einsum("nq,nq->n", at, cross) + np.einsum("nq,nqr,nr->n", at, raw, at)
+        left = (left + np.einsum("nqr,nrq->n", raw, spread)) * use
         noise = max(float(left.sum()) / max(samples, 1.0), 1e-12)
     return at, spread
 

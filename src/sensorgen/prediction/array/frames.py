@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.core.arrays import Complex, Mask, Real, Whole
 from sensorgen.core.document import Column, Facts, Part, Table, comma_separated, to_json
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
@@ -31,7 +31,9 @@ _LEAST_PHASE = 50.0  # degrees that capacitances alone need
 _SHORTED = 10.0  # real part at rest over the predicted magnitude
 _LEAKS = 6  # steps to the conductance of shorts
 _SHOWN = 6  # crossings that are named
-_EVEN = 1e-3  # of a place's weight: planes are even along what no value tells
+_AROUND = 5  # squares within which crossings tell of a lost one
+_LENGTHS = (1.0, 1.5, 2.0, 3.0, 4.5, 7.0)  # of the correlation of pressures, in pitches
+_RATIOS = np.geomspace(1e-10, 1.0, 41)  # of noise to what pressures vary by, squares
 _CI = 1.96  # standard errors of 95 %
 
 
@@ -91,17 +93,19 @@ class PressureMaps:
 
     @cached_property
     def filled(self) -> tuple[Real, Real]:
-        """Pressures with lost crossings by a plane through those around them, and errors [kPa].
+        """Pressures with lost crossings as a Gaussian field by those around, and errors; nan of none around [kPa].
 
-        The error is that of such planes at the determined crossings of the frame, as a share; nan where none is around.
+        The squares of the errors of lost ones add up to that of their sum.
         """
-        lost = np.isnan(self.pressure_kpa) & self.model.here
-        if not lost.any():
-            return self.pressure_kpa, self.sigma_kpa
-        plane = np.maximum(_planes(self.pressure_kpa), 0.0)
-        off, size = (np.nansum(of**2, (1, 2)) for of in (self.pressure_kpa - plane, np.where(lost, 0.0, plane)))
-        error = np.sqrt(off / np.maximum(size, 1e-30))[:, None, None] * plane
-        return np.where(lost, plane, self.pressure_kpa), np.where(lost, error, self.sigma_kpa)
+        shape = self.pressure_kpa.shape
+        pressure, sigma = (each.reshape(shape[0], -1).copy() for each in (self.pressure_kpa, self.sigma_kpa))
+        masks, which = np.unique(np.isfinite(pressure), axis=0, return_inverse=True)
+        for k, known in enumerate(masks):
+            if known.any() and (self.model.here.ravel() & ~known).any():
+                frames, field = which.ravel() == k, _field(self.model, known.tobytes())
+                near, lost = (np.ix_(frames, at) for at in (field.near, field.lost))
+                pressure[lost], sigma[lost] = field.at_lost(pressure[near], sigma[near])
+        return pressure.reshape(shape), sigma.reshape(shape)
 
     @property
     def _newtons(self) -> tuple[Real, Real]:
@@ -518,23 +522,65 @@ class MapInverter:
         return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration)
 
 
-def _planes(values: Real) -> Real:
-    """Planes through the values within two places around each, weighed by distance, its own left out, (k, m, n)."""
+@dataclass(frozen=True, eq=False)
+class _Field:
+    """Gaussian field of mean 0 on some crossings, by its correlation of several lengths (Rasmussen and Williams 2006).
+
+    Attributes
+    ----------
+    near, lost : array of int
+        Determined crossings, and those that are not.
+    forms : tuple of (values, vectors, across, own)
+        Of each length: eigenvalues and vectors of the correlation of those near, correlation of lost ones with these
+        vectors, and with each other.
+    """
+
+    near: Whole
+    lost: Whole
+    forms: tuple[tuple[Real, Real, Real, Real], ...]
+
+    def at_lost(self, kpa: Real, sigma: Real) -> tuple[Real, Real]:
+        """Conditional means and errors of lost crossings, (k, l), by pressures near, (k, n), and their errors.
+
+        Length and size are the likeliest of each frame (eq. 5.8), the noise alike at all that are near.
+        """
+        noise = np.mean(sigma**2, 1)[:, None] + 1e-30
+        found, most = np.zeros((2, len(kpa), len(self.lost))), np.full(len(kpa), -np.inf)
+        for values, vectors, across, own in self.forms:
+            along, some = kpa @ vectors, 1 / (values + _RATIOS[:, None])  # noise over the field's variance
+            likely = np.log(some * _RATIOS[:, None]).sum(1) - _RATIOS / noise * (along**2 @ some.T)
+            likely -= values.size * np.log(noise)
+            best = likely.argmax(1)
+            better, most = likely.max(1) > most, np.maximum(most, likely.max(1))
+            gain, size = some[best], noise / _RATIOS[best][:, None]
+            spread = own.sum(0) - (gain * across.sum(0)) @ across.T
+            found[:, better] = np.stack([(gain * along) @ across.T, np.sqrt(size * np.maximum(spread, 0.0))])[:, better]
+        return found[0], found[1]
+
+
+@lru_cache(maxsize=4)
+def _field(model: ArrayModel, known: bytes) -> _Field:
+    """Field on the crossings that are not known, and those within some squares of them."""
     from scipy import ndimage
 
-    y, x = np.mgrid[-2:3, -2:3].astype(float)
-    weight = np.where(x**2 + y**2, np.exp(-(x**2 + y**2) / 2), 0.0)
-    known, terms = np.isfinite(values), (np.ones((5, 5)), x, y)
-
-    def moments(of: Real, *more: Real) -> Real:
-        return np.stack(
-            [ndimage.correlate(of, (weight * np.prod([t, *more], 0))[None], mode="constant") for t in terms], -1
+    here, read = model.here, np.frombuffer(known, bool).reshape(model.here.shape)
+    lost = here & ~read
+    near = here & read & ndimage.binary_dilation(lost, np.ones((3, 3)), iterations=_AROUND)
+    place, forms = np.stack(np.meshgrid(model.layout.x_mm, model.layout.y_mm), -1), []
+    (a, b), pitch = (place[near], place[lost]), float(np.sqrt(np.prod(model.layout.params.pitch)))
+    for length in _LENGTHS:
+        among, across, own = (
+            _matern(np.hypot(*(one[:, None] - other).T).T / (length * pitch)) for one, other in ((a, a), (b, a), (b, b))
         )
+        values, vectors = np.linalg.eigh(among)
+        forms.append((np.maximum(values, 0.0), vectors, across @ vectors, own))
+    return _Field(np.flatnonzero(near), np.flatnonzero(lost), tuple(forms))
 
-    gram = np.stack([moments(known.astype(float), term) for term in terms], -1)
-    count = gram[..., 0, 0] > 0
-    right = moments(np.where(known, values, 0.0))[..., None]
-    return np.where(count, np.linalg.solve(gram + np.diag([1e-12, _EVEN, _EVEN]), right)[..., 0, 0], np.nan)
+
+def _matern(of: Real) -> Real:
+    """Correlation of Matern, twice differentiable, by distances over the length."""
+    root = np.sqrt(5.0) * of
+    return np.asarray((1 + root + root**2 / 3) * np.exp(-root))
 
 
 @lru_cache(maxsize=4)

@@ -253,7 +253,8 @@ def _left_out(sessions: Sequence[ArraySession], form: LawForm) -> float:
 def _error(own: Sums, law: ElementLaw) -> float:
     at = np.exp(law.drift * (own.day - law.day)) * law.at
     if own.count.any():
-        left = own.square - 2 * np.einsum("nq,nq->n", at, own.cross) + np.einsum("nq,nqr,nr->n", at, own.gram, at)
+        net = own.gram - own.noise
+        left = own.square - 2 * np.einsum("nq,nq->n", at, own.cross) + np.einsum("nq,nqr,nr->n", at, net, at)
         use = law.alive & (own.count > 0)
         return float(np.median(np.sqrt(np.maximum(left[use], 0.0) / own.count[use])))
     return float(np.sqrt(np.mean((own.force - own.total(at * law.alive[:, None])) ** 2)))
