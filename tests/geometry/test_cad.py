@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from sensorgen.core import lazy as registry
-from sensorgen.core import process as core_worker
+from sensorgen.core import worker as core_worker
 from sensorgen.core.errors import CadFailed, Unwritable
 from sensorgen.design import shapes
 from sensorgen.scene.geometry import cad

@@ -14,7 +14,7 @@ from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from sensorgen.core.errors import BadInput, NotInstalled, SensorgenError
-from sensorgen.core.process import end_with_parent
+from sensorgen.core.leash import end_with_parent
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future

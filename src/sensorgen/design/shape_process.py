@@ -159,7 +159,7 @@ def main() -> None:
         os.dup2(nowhere, handle)
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
     from sensorgen.core.errors import SensorgenError
-    from sensorgen.core.process import end_with_parent
+    from sensorgen.core.leash import end_with_parent
 
     end_with_parent()
     first = json.loads(source.readline())

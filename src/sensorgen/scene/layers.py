@@ -172,11 +172,11 @@ def faces_mm(body: Body) -> set[float]:
 
 def region_at(body: Body, z_mm: float) -> Region:
     """Region of a body at a height."""
-    return _united(frozenset(o for p in body.pieces for o in p.cut("z", z_mm)))
+    return _united(tuple(dict.fromkeys(o for p in body.pieces for o in p.cut("z", z_mm))))
 
 
 @lru_cache(maxsize=64)
-def _united(outlines: frozenset[Outline]) -> Region:
+def _united(outlines: tuple[Outline, ...]) -> Region:
     """Union of outlines; equal layers share one."""
     by_corners = defaultdict(list)
     for outline in outlines:

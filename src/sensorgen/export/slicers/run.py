@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import SlicerFailed
-from sensorgen.core.process import NOT_RUN, on_leash
+from sensorgen.core.leash import NOT_RUN, on_leash
 from sensorgen.export.slicers import TIME_LIMIT_S
 from sensorgen.scene.geometry.meshes import Mesh
 

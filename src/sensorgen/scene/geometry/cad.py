@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import CadFailed, SensorgenError
-from sensorgen.core.process import Worker, WorkerEnded
+from sensorgen.core.worker import Worker, WorkerEnded
 from sensorgen.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput, CadFailed, SensorgenError, Unwritable
-from sensorgen.core.process import answer_input
+from sensorgen.core.worker import answer_input
 from sensorgen.scene.scene import AXES, PLANE, Body, Piece, Point, Prism, Scene
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.core.errors import BadInput, NotInstalled
-from sensorgen.core.process import Worker, WorkerEnded, answer_input
+from sensorgen.core.worker import Worker, WorkerEnded, answer_input
 
 Edge = tuple[tuple[float, float], tuple[float, float]]
 
