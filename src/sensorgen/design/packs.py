@@ -8,10 +8,9 @@ given again, so that a design means the same everywhere.
 
 import os
 import re
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -213,19 +212,13 @@ def installed() -> list[Pack]:
     BadInput
         An entry point is damaged, or names a folder that is not there.
     """
+    from importlib.metadata import entry_points
+
     try:
-        points = _points(tuple(sys.path))
+        points = sorted(entry_points(group=GROUP), key=lambda point: point.name)
     except Exception as error:  # whatever a damaged package makes of it
         raise BadInput(f"entry points of installed packages cannot be read ({error}); repair or uninstall it") from None
     return [_of_package(point) for point in points]
-
-
-@lru_cache(maxsize=1)
-def _points(_: tuple[str, ...]) -> list["EntryPoint"]:
-    """Entry points of our group on a path, by name: reading those of all packages takes a while."""
-    from importlib.metadata import entry_points
-
-    return sorted(entry_points(group=GROUP), key=lambda point: point.name)
 
 
 def _of_package(point: "EntryPoint") -> Pack:

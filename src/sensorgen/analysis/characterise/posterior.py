@@ -379,8 +379,6 @@ def select(candidates: Candidates, count: int, fits: Fits) -> tuple[int, ...]:
     two are exchanged at once, as long as that is better (Fedorov's exchange). The optimum of such steps, not proved to
     be the largest: equal to the search through all sets on small catalogues.
 
-    Notes
-    -----
     None or one of the coupons is dead, and each goal that is missed costs:
 
     .. math:: \max_S \; (1 - p n) \, D(S) + p \sum_{i \in S} D(S \setminus i)

@@ -255,8 +255,8 @@ class LawForm:
     def derivatives(self, x: Real) -> Real:
         """First and second derivatives of the terms by the reading, those of the past 0, (2, k, n, terms)."""
         power, x = np.arange(1 if self.tared else 0, self.powers + 1), x[:, :, None]
-        found = np.stack([power * x ** np.maximum(power - 1, 0), power * (power - 1) * x ** np.maximum(power - 2, 0)])
-        return np.pad(found, [(0, 0)] * 3 + [(0, bool(self.tau_s) + bool(self.play))])
+        orders = np.stack([power * x ** np.maximum(power - 1, 0), power * (power - 1) * x ** np.maximum(power - 2, 0)])
+        return np.pad(orders, [(0, 0)] * 3 + [(0, bool(self.tau_s) + bool(self.play))])
 
     def words(self) -> str:
         """The form in words."""

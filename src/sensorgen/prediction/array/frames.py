@@ -545,7 +545,7 @@ class _Field:
         Length and size are the likeliest of each frame (eq. 5.8), the noise alike at all that are near.
         """
         noise = np.mean(sigma**2, 1)[:, None] + 1e-30
-        found, most = np.zeros((2, len(kpa), len(self.lost))), np.full(len(kpa), -np.inf)
+        lost, most = np.zeros((2, len(kpa), len(self.lost))), np.full(len(kpa), -np.inf)
         for values, vectors, across, own in self.forms:
             along, some = kpa @ vectors, 1 / (values + _RATIOS[:, None])  # noise over the field's variance
             likely = np.log(some * _RATIOS[:, None]).sum(1) - _RATIOS / noise * (along**2 @ some.T)
@@ -554,8 +554,8 @@ class _Field:
             better, most = likely.max(1) > most, np.maximum(most, likely.max(1))
             gain, size = some[best], noise / _RATIOS[best][:, None]
             spread = own.sum(0) - (gain * across.sum(0)) @ across.T
-            found[:, better] = np.stack([(gain * along) @ across.T, np.sqrt(size * np.maximum(spread, 0.0))])[:, better]
-        return found[0], found[1]
+            lost[:, better] = np.stack([(gain * along) @ across.T, np.sqrt(size * np.maximum(spread, 0.0))])[:, better]
+        return lost[0], lost[1]
 
 
 @lru_cache(maxsize=4)

@@ -303,7 +303,7 @@ class Elements:
             here = slice(k, k + step)
             residual, matrix = self.full(u, inner, here)
             inside = np.concatenate([matrix[:, outer:, :outer], residual[:, outer:, None]], axis=2)
-            solved = np.linalg.inv(matrix[:, outer:, outer:]) @ inside  # of 5 x 5: half of the time of solving
+            solved = np.linalg.inv(matrix[:, outer:, outer:]) @ inside  # small ones: sooner than solving
             taken = np.matmul(matrix[:, :outer, outer:], solved)
             yield Tangent(
                 matrix[:, :outer, :outer] - taken[..., :-1],
