@@ -140,7 +140,7 @@ def test_wrong_words_end_with_2_and_one_line(run, words, said):
     assert said in found.line
 
 
-@pytest.mark.parametrize("model", ["press2d", "springs"])
+@pytest.mark.parametrize("model", [pytest.param("press2d", marks=pytest.mark.nightly), "springs"])
 def test_values_that_no_source_gives_are_told_with_their_ranges(run, model):
     """BVOH has none: its modulus is that of any filament, up to that of rigid plastics."""
     if model == "press2d":
