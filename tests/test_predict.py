@@ -154,6 +154,7 @@ def test_corner_frequencies_of_the_plate(slots, corner_khz):
     assert corner.model.lower == close(corner.model.upper, 1e-12)
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_capacitances_of_the_thesis_sensors():
     """100 x 10 mm: tri 79.8, rect 203, plate 69.1 pF (models-cells.md); the first two lie within their bounds."""
     for shape, film, exact in (("tri", 0.1, 79.8e-12), ("rect", 0.1, 203e-12), ("reference", 0.6, PLATE_F)):

@@ -41,7 +41,7 @@ def test_fitted_presses_are_as_far_apart_as_stated(model, noise):
         true = np.array([[PRESS_N, x + phase - distance / 2, y], [PRESS_N, x + phase + distance / 2, y]])
         load = model.carried(pressures(model, true)[None])[0]
         siemens = nodal(model.tracks(), model.capacitances(model.under(load)[0]), readout)
-        for _ in range(6):
+        for _ in range(4):
             off = noise * np.abs(siemens) * (draw.normal(size=load.shape) + 1j * draw.normal(size=load.shape))
             maps = inverter.maps((siemens + off)[None], np.zeros(1)).on_surface()
             one, two = 1e3 * maps.pressure_kpa[0], 1e3 * maps.sigma_kpa[0]

@@ -96,16 +96,14 @@ def test_every_tip_of_the_default_is_printed(sliced, shape, slicer):
     ],
 )
 def test_capacitance_is_that_of_another_programs_voxels(sliced, shape, slicer):
-    """Finite volumes of 1/40 and 1/80 of a period, their error of first order; the cone had 31 % more."""
+    """Finite volumes of 1/20 and 1/40 of a period, their error of first order; the cone had 31 % more."""
     pytest.importorskip("ngsolve")
     design, _, file = sliced(shape, slicer)
     print_ = voxels.read(file.read_text())
     conductor, film = (design.tool(design.printed.body(name).material) for name in ("bottom_electrode", "film"))
     coarse, fine = (
         voxels.capacitance(tools, heights, CELL_MM, thin, {film: EPS["x60"], -1: EPS["air"]}, conductor)
-        for thin, (tools, heights) in (
-            (n * 3 // 40, voxels.painted(print_, print_.middle(), CELL_MM, n)) for n in (40, 80)
-        )
+        for thin, (tools, heights) in ((n // 20, voxels.painted(print_, print_.middle(), CELL_MM, n)) for n in (20, 40))
     )
     cells = from_gcode(design, file).cells
     found = prisms.capacitance(cells.first(), EPS, 0.03)

@@ -96,7 +96,7 @@ def test_the_range_of_a_gyroid_without_g_code_holds_its_layers():
     plate = EPS0_F_PER_M * 100 * M_PER_MM / 0.6
     printed = estimated(design, "arachne")
     span = rest_state(printed).capacitance.print
-    for period_mm in (1.0, 2.0, 4.0):
+    for period_mm in (1.0, 4.0):
         assert span.lower / plate < gyroid(period_mm, 0.4) < span.upper / plate
     assert any("gyroid infill of x60 as stripes" in said for said in quantities._assumptions(printed, None))
 

@@ -100,15 +100,16 @@ def test_faces_that_run_through_each_other_are_caught(monkeypatch):
         assert found.converged_pa < 4e5  # they touch at 120 kPa
 
 
-def test_the_capacitance_is_continuous_where_pillars_meet(mirrored):
+def test_the_capacitance_is_continuous_where_pillars_meet():
     """Loads 3 kPa apart from 120 kPa on, where they meet: C goes on rising, never by a step."""
-    stresses = np.concatenate([np.linspace(0, 1.14e5, 5), np.arange(1.17e5, 1.51e5, 3e3)])
+    stresses = np.concatenate([np.linspace(0, 1.14e5, 3), np.arange(1.17e5, 1.51e5, 3e3)])
     middle, _ = with_field(pillars(0.05, 1), stresses)
-    rises = np.diff(middle[5:])
+    rises = np.diff(middle[3:])
     assert (rises[1:] / rises[:-1]).min() > 0.6
     assert (rises[1:] / rises[:-1]).max() < 1.1
     assert rises[-1] < 0.7 * rises[0]  # slower once they have met
-    assert middle[-1] == pytest.approx(mirrored.capacitance_f_per_m2[3].middle(), rel=1e-4, abs=0)
+    at_once, _ = with_field(pillars(0.05, 1), [0.0, stresses[-1]])
+    assert middle[-1] == pytest.approx(at_once[1], rel=1e-4, abs=0)
 
 
 def test_an_upright_gap_that_is_shut_is_none():
@@ -132,7 +133,7 @@ def test_a_dovetail_is_held_on_its_undercut_flank(turned):
     foot = [(0, 0), (0.45, 0), (0.25, 0.5), (0, 0.5)]
     hook = [(0.5, 0), (0.7, 0), (0.7, 0.5), (0.3, 0.5)]
     drawn = [[(0.7 - x if turned else x, BASE + y) for x, y in shape] for shape in (foot, hook)]
-    found, run = solved(cell_of(0.5, 0, 0.7, *(d[::-1] if turned else d for d in drawn)), np.linspace(0, 2e5, 6))
+    found, run = solved(cell_of(0.5, 0, 0.7, *(d[::-1] if turned else d for d in drawn)), np.linspace(0, 2e5, 4))
     assert found.faults == ()
     assert found.displacement_m[-1] * 1e6 == pytest.approx(33.4, rel=0.005)
     force, places = forces(run, run.states[-1])

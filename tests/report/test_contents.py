@@ -440,7 +440,7 @@ def test_readings_without_a_design_make_a_report(tmp_path):
 def test_figures_as_files(of_recorded):
     wanted = [c for c in of_recorded.figures if c.key in ("residuals", "reactance-1-1")]
     assert len(wanted) == 2
-    for chart in (dataclasses.replace(c, choices=dict(list(c.choices.items())[:2])) for c in wanted):
+    for chart in (dataclasses.replace(c, choices=dict(list(c.choices.items())[:1])) for c in wanted):
         first = dict(files(chart))
         assert dict(itertools.islice(files(chart), 2)).items() <= first.items()  # the same bytes again
         assert len(first) == 2 * len(chart.choices)
