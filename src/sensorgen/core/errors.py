@@ -75,6 +75,10 @@ class BadInput(SensorgenError):
     """A file or a word on the command line that cannot be read as what it should be."""
 
 
+class NotTrusted(BadInput):
+    """A shape's file whose content the user has not trusted."""
+
+
 class MissingValue(SensorgenError):
     """A value that no source gives."""
 

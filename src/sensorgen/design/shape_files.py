@@ -26,7 +26,7 @@ from pydantic import ValidationError
 from sensorgen.core import cache as answers
 from sensorgen.core import files
 from sensorgen.core.display import harmless
-from sensorgen.core.errors import BadInput, OutOfRange, Unwritable
+from sensorgen.core.errors import BadInput, NotTrusted, OutOfRange, Unwritable
 from sensorgen.core.records import problem
 from sensorgen.design import packs, shape_process
 from sensorgen.scene.polyhedra import Loft, Polyhedron
@@ -58,15 +58,12 @@ class Shape(Protocol):
         """Bodies for parameters and materials."""
 
 
-class NotTrusted(BadInput):
-    """A shape's file whose content the user has not trusted."""
-
-    def __init__(self, name: str, text: str) -> None:
-        super().__init__(
-            f"{name}.py is not trusted and did not run: a shape is a program; read it, then: sensorgen pack trust "
-            f"shapes/{name}.py (its file, or the design's that contains it), and again after each change; SHA-256 "
-            f"{digest(text)}"
-        )
+def _not_trusted(name: str, text: str) -> NotTrusted:
+    return NotTrusted(
+        f"{name}.py is not trusted and did not run: a shape is a program; read it, then: sensorgen pack trust "
+        f"shapes/{name}.py (its file, or the design's that contains it), and again after each change; SHA-256 "
+        f"{digest(text)}"
+    )
 
 
 def load(name: str, text: str) -> Shape:
@@ -80,7 +77,7 @@ def load(name: str, text: str) -> Shape:
         The file is no shape; the message names its line.
     """
     if not is_trusted(text):
-        raise NotTrusted(name, text)
+        raise _not_trusted(name, text)
     return _foreign(name, text)
 
 
@@ -289,7 +286,7 @@ class _ShapeProcess:
 
     def __init__(self, name: str, text: str) -> None:
         if not is_trusted(text):
-            raise NotTrusted(name, text)
+            raise _not_trusted(name, text)
         self.name = name
         self._process = subprocess.Popen(  # noqa: S603 - this very program
             [sys.executable, "-I", "-S", "-B", shape_process.__file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE,

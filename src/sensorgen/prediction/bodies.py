@@ -58,10 +58,12 @@ def _parts(design: Design) -> "list[tuple[Scene, float]]":
 
     Other patterns are whole: models of prisms find the cell, and what the sensor's ends cut off.
     """
+    scene, params = design.in_use, design.params
+    if all(isinstance(p, Prism) for b in scene.bodies for p in b.pieces):
+        return [(scene, 1.0)]
     from sensorgen.scene.patterns import ArrayParams
 
-    scene, params = design.in_use, design.params
-    if not isinstance(params, ArrayParams) or all(isinstance(p, Prism) for b in scene.bodies for p in b.pieces):
+    if not isinstance(params, ArrayParams):
         return [(scene, 1.0)]
     given = design.model_dump(exclude_defaults=True, mode="json")
     parts = []

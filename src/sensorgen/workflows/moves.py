@@ -17,8 +17,7 @@ from sensorgen.core.findings import Finding
 from sensorgen.design.best import KnownDesign
 from sensorgen.design.design import Design, make
 from sensorgen.scene.scene import Envelope
-from sensorgen.workflows.changes import finding_counts
-from sensorgen.workflows.trial import Trial
+from sensorgen.workflows.trial import Trial, finding_counts
 
 Key = tuple[str, ...]  # of a design file, as in ("parameters", "period_mm")
 Value = float | str

@@ -26,7 +26,8 @@ from sensorgen.prediction.calibration.rest import RestChange, checked
 from sensorgen.prediction.calibration.specimen import Bench as Bench
 from sensorgen.prediction.calibration.specimen import SpecimenModel
 from sensorgen.prediction.calibration.specimen import spread_of as spread_of
-from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
+from sensorgen.prediction.inference import NORMAL_90
+from sensorgen.prediction.inverse.verdict import chi2_limit
 from sensorgen.prediction.query import TONES_HZ, Query
 from sensorgen.prediction.sensor_model import SensorModel, sensor_model
 

@@ -6,6 +6,7 @@ and position (6.30 to 6.32), and normalised differences of several recordings (6
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,9 +28,11 @@ from sensorgen.analysis.plots.figure import (
 from sensorgen.analysis.plots.pages import PageSection, page
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.signal.presses import Pairs, Surface, normalised, surface
-from sensorgen.measure.signal.run import Hysteresis
-from sensorgen.measure.signal.schedule import Step
+
+if TYPE_CHECKING:
+    from sensorgen.measure.signal.presses import Pairs, Surface
+    from sensorgen.measure.signal.run import Hysteresis
+    from sensorgen.measure.signal.schedule import Step
 
 PARTS = {"resistance": ("R", "real"), "reactance": ("X", "imag")}
 _TIME, _FORCE, _POSITION = Axis("time [s]"), Axis("force [N]"), Axis("position [mm]")
@@ -59,7 +62,7 @@ class DrawnRecording:
     raw_ohm: Complex
     filtered_s: Real
     filtered_ohm: Complex
-    pairs: Pairs | None
+    pairs: "Pairs | None"
 
 
 def series(run: DrawnRecording, key: str = "time") -> Figure:
@@ -89,8 +92,10 @@ def _line(name: str, time_s: Real, values: Real, colour: str) -> Curve:
     return Curve("line", name, time_s[at], values[at], colour=colour)
 
 
-def difference_surface(pairs: Pairs, part: str) -> Surface:
+def difference_surface(pairs: "Pairs", part: str) -> "Surface":
     """Change of "resistance" or "reactance" by the loads, over force and position [ohm]."""
+    from sensorgen.measure.signal.presses import surface
+
     return surface(pairs.force_n, pairs.position_mm, getattr(pairs.difference_ohm, PARTS[part][1]))
 
 
@@ -120,7 +125,7 @@ def differences(run: DrawnRecording, part: str, key: str = "") -> Figure:
 
 
 def compared(
-    runs: Mapping[str, Pairs], tones_hz: Real, *, together: bool = False, key: str = "normalised", left_out: str = ""
+    runs: "Mapping[str, Pairs]", tones_hz: Real, *, together: bool = False, key: str = "normalised", left_out: str = ""
 ) -> Figure:
     """Differences of several recordings on one scale from 0 to 1, over force, R and X at each frequency.
 
@@ -137,6 +142,8 @@ def compared(
     left_out : str
         Sentence on recordings that are not drawn.
     """
+    from sensorgen.measure.signal.presses import normalised
+
     parts = {
         symbol: normalised([getattr(pairs.difference_ohm, part) for pairs in runs.values()], together=together)
         for symbol, part in PARTS.values()
@@ -160,7 +167,7 @@ def compared(
     return Figure.by_frequency(key, title, alt, tones_hz, panels, columns=2)
 
 
-def hysteresis(loads: Mapping[float, Hysteresis], tones_hz: Real, name: str) -> Figure:
+def hysteresis(loads: "Mapping[float, Hysteresis]", tones_hz: Real, name: str) -> Figure:
     """Change of R and X under rising (solid) and falling force (dashed), at the first and the last frequency.
 
     Parameters
@@ -189,7 +196,7 @@ def hysteresis(loads: Mapping[float, Hysteresis], tones_hz: Real, name: str) -> 
     return Figure.by_frequency("hysteresis", title, alt, tones_hz[ends], panels, columns=2)
 
 
-def schedule(steps: Sequence[Step], seconds: float) -> Figure:
+def schedule(steps: "Sequence[Step]", seconds: float) -> Figure:
     """Plan of a run: force over position in the order of the run, and force over time."""
     force, position = np.array([s.force_n for s in steps]), np.array([s.position_mm for s in steps])
     order = Map(position, force, np.arange(1.0, len(steps) + 1), "load")

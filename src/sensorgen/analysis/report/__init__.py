@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sensorgen.analysis.comparison import UNTRUSTED, Comparison, known_iterations, of_iteration
 from sensorgen.analysis.comparison.measured import RecordedRun, runs
@@ -27,7 +27,9 @@ from sensorgen.core.version import __version__
 from sensorgen.design.materials import SET, citations
 from sensorgen.measure.log import Anchor, Log, RawFile
 from sensorgen.measure.log.notes import specimen as named
-from sensorgen.prediction.calibration.calibration import Calibration
+
+if TYPE_CHECKING:
+    from sensorgen.prediction.calibration.calibration import Calibration
 
 LIBRARIES = ("numpy", "scipy", "plotly", "matplotlib", "jinja2")
 
@@ -226,7 +228,7 @@ def _nothing(log: Log, of: str, left_out: Sequence[tuple[str, str]]) -> BadInput
 
 
 def _explanations(
-    comparison: Comparison, recorded: Sequence[RecordedRun], calibrated: Sequence[Calibration]
+    comparison: Comparison, recorded: Sequence[RecordedRun], calibrated: "Sequence[Calibration]"
 ) -> list[explained.Explanation]:  # fmt: skip
     """Effect of each parameter; a calibration explains more of its specimen's recordings than one parameter can."""
     own = {one.specimen for one in calibrated}
@@ -236,7 +238,7 @@ def _explanations(
 def _sections(
     log: Log, comparison: Comparison, recorded: Sequence[RecordedRun], explanations: Sequence[explained.Explanation],
     impedances: Table | None, ac: Sequence[alternating.AcRow], changes: Sequence[history.HistoryRow],
-    calibrated: Sequence[Calibration], left_out: Sequence[tuple[str, str]],
+    calibrated: "Sequence[Calibration]", left_out: Sequence[tuple[str, str]],
 ) -> Iterator[PageSection]:  # fmt: skip
     alone = len(comparison.rows) <= 1 and not recorded  # a short page
     figures = (*electrodes.figures(comparison), *(recordings.residuals(impedances) if impedances else ()))

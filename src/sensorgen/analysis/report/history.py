@@ -3,7 +3,7 @@
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.report.alternating import BAKED, AcRow, at_text
@@ -11,7 +11,9 @@ from sensorgen.core.document import Cell, Column, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log import Log
-from sensorgen.prediction.calibration.calibration import Calibration, from_json
+
+if TYPE_CHECKING:
+    from sensorgen.prediction.calibration.calibration import Calibration
 
 CALIBRATION_NOTE = (
     "Ratios of a calibrated specimen to its prediction, with intervals in the JSON of `sensorgen calibrate`. Covered: "
@@ -36,11 +38,13 @@ class CalibrationRow:
     position_width_mm: Annotated[float | None, Column("width of position", "mm", "median of the intervals", digits=3)]
 
 
-def latest(log: Log, specimens: Container[str], left_out: list[tuple[str, str]]) -> list[Calibration]:
+def latest(log: Log, specimens: Container[str], left_out: list[tuple[str, str]]) -> "list[Calibration]":
     """The latest calibration of each specimen; those that cannot be read go to ``left_out``."""
     rows = {row.specimen: row for row in log.entries(Row) if row.specimen in specimens}
     calibrated = []
     for name, row in rows.items():
+        from sensorgen.prediction.calibration.calibration import from_json
+
         try:
             calibrated.append(from_json(row.data))
         except BadInput as error:
@@ -48,12 +52,12 @@ def latest(log: Log, specimens: Container[str], left_out: list[tuple[str, str]])
     return calibrated
 
 
-def calibration_table(calibrations: Sequence[Calibration]) -> Table:
+def calibration_table(calibrations: "Sequence[Calibration]") -> Table:
     """A row for each."""
     return Table.of("calibrations", "Specimens by their calibration", [_calibration_row(one) for one in calibrations])
 
 
-def _calibration_row(one: Calibration) -> CalibrationRow:
+def _calibration_row(one: "Calibration") -> CalibrationRow:
     values, held_out, sensor = {v.name: v.value for v in one.values()}, one.held_out, one.model.sensor
     return CalibrationRow(
         one.specimen, one.design, one.posterior.presses, values["resistance"] / sensor.resistance_ohm(),
@@ -64,7 +68,7 @@ def _calibration_row(one: Calibration) -> CalibrationRow:
     )  # fmt: skip
 
 
-def calibration_findings(calibrations: Sequence[Calibration]) -> Iterator[str]:
+def calibration_findings(calibrations: "Sequence[Calibration]") -> Iterator[str]:
     """One sentence for each specimen."""
     for one in calibrations:
         row = _calibration_row(one)

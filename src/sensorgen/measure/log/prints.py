@@ -13,11 +13,10 @@ from typing import Any
 
 from pydantic import Field
 
-from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, within
+from sensorgen.core.errors import BadInput, MissingValue, NotTrusted, SensorgenError, within
 from sensorgen.core.records import Strict, checked, shown
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design, load, of_resolved
-from sensorgen.design.shape_files import NotTrusted
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import notes
 from sensorgen.measure.log.entries import Batch, BenchRun, DesignRow, Entry, Prediction, Print, RawFile, Reading

@@ -30,7 +30,7 @@ from sensorgen.prediction.array.elements import (
     scale_of,
     sums_of,
 )  # fmt: skip
-from sensorgen.prediction.inverse.verdict import NORMAL_90
+from sensorgen.prediction.inference import NORMAL_90
 
 LEVEL = 0.9
 TAUS_S = (10.0, 30.0, 100.0, 300.0)

@@ -17,9 +17,8 @@ from sensorgen.design.design import Design
 from sensorgen.models import line
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import bodies
-from sensorgen.prediction.inference import Parameter, Samples, parts, slopes
+from sensorgen.prediction.inference import NORMAL_90, Parameter, Samples, parts, slopes
 from sensorgen.prediction.inverse.forward import Forward, tones
-from sensorgen.prediction.inverse.verdict import NORMAL_90
 from sensorgen.prediction.query import TONES_HZ, Query, Tip
 from sensorgen.prediction.sensor_model import SensorModel, sensor_model
 
