@@ -99,8 +99,7 @@ def compensated(
         layers = f"{FILM_LAYERS} layers at least, {wanted[GAP]:g} mm at layers of {now.layers.layer_mm:g} mm"
         raise _refused(f": a film has {layers}", design, made, printed, asked)
     if search.best is None:
-        reason = next((f" without an error ({one.discarded})" for one in search.estimates if one.discarded), "")
-        raise _refused(f" of {design.name} by {walls} walls{reason}", design, made, printed, asked)
+        raise _refused(f" of {design.name} by {walls} walls{search.fault()}", design, made, printed, asked)
     if not after.values:
         return now, changes
     why = "gap, capacitance and stiffness" if stiffness else "gap and capacitance"
@@ -247,6 +246,10 @@ class CompensationSearch(Nearest):
             return round(gap, 6), sum(others)
 
         return min(self.prints or (one for one in self.estimates if not one.discarded), key=distance)
+
+    def fault(self) -> str:
+        """Reason of the first design that a rule refuses, in words."""
+        return next((f" without an error ({one.discarded})" for one in self.estimates if one.discarded), "")
 
     def order(self, one: Candidate) -> tuple[float, ...]:
         """Distance and half of what the capacitance was off before; half way of a width that it leads to."""

@@ -181,20 +181,21 @@ def _by_height(
     ends = _as_given(every, given)
     left = [group for group in every if group[0] not in ends]
     electrodes = [group for group in every if any(ends.get(name) != "" for name in group)]
-    if left and len(electrodes) > len(_BY_HEIGHT):
-        raise _undecided(electrodes, left)
+    _refuse_undecided(electrodes, left)
     electrodes.sort(key=lambda group: sum(middle_mm[name] for name in group) / len(group))
     places = _BY_HEIGHT if len(electrodes) == len(_BY_HEIGHT) else ("bottom", "top")
     for group, end in zip(electrodes, places, strict=False):
-        ends |= dict.fromkeys(group, end) if group in left else {}
+        ends = dict.fromkeys(group, end) | ends
     return ends
 
 
-def _undecided(electrodes: Sequence[Sequence[str]], left: Sequence[Sequence[str]]) -> MissingValue:
-    """More electrodes than terminals."""
+def _refuse_undecided(electrodes: Sequence[Sequence[str]], left: Sequence[Sequence[str]]) -> None:
+    """Refuse more electrodes than terminals, where some of them have none given."""
+    if not left or len(electrodes) <= len(_BY_HEIGHT):
+        return
     apart = ", ".join(sorted(group[0] for group in electrodes))
     words = " ".join(f"--terminal {group[0]}=END" for group in left)
-    return MissingValue(
+    raise MissingValue(
         f"{len(electrodes)} electrodes that do not touch: {apart}; give {words}, END top, middle, bottom or none"
     )
 
@@ -407,7 +408,7 @@ def write(
     old, drawn = _bodies_of(path), drawn_body(design).cells.first()
     files.replace(beside, content.encode())
     files.replace(path, text.encode())
-    if old and old != beside:
+    if old:
         _remove_unused(old)
     return Imported(
         str(path), str(beside), bodies.size_mm, tuple((-low.round(9) + 0.0).tolist()),

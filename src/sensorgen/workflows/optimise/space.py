@@ -15,6 +15,7 @@ from sensorgen.workflows.optimise.target import Range, Target
 MOST = 20_000  # designs: their checks alone take half an hour on two cores
 _NEAR = 1e-9
 Data = dict[str, Any]
+Part = tuple[dict[str, Value], dict[str, list[Value]]]  # choices, and values that they leave the shape's parameters
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Space:
     base: Data
     folder: Path
     lengths: frozenset[str]
-    parts: tuple[tuple[dict[str, Value], dict[str, list[Value]]], ...]
+    parts: tuple[Part, ...]
 
     @property
     def size(self) -> int:
@@ -101,25 +102,33 @@ def space(target: Target, folder: Path = Path()) -> Space:
     base = with_own_files({k: v for k, v in design.items() if k != "name"}, folder)
     known = frozenset(asdict(make(base).params))
     _refuse_unknown(target, known)
-    # the grid of a length follows from quality, printer and nozzle: those are chosen first
-    outer = {k: v for k, v in target.parameters.items() if k not in known}
-    inner = {k: v for k, v in target.parameters.items() if k in known}
-    whole = Space(base, folder, known, tuple(
-        (chosen, {k: _values(k, v, with_own_files(_with(base, known, chosen), folder)) for k, v in inner.items()})
-        for chosen in _combinations({k: _listed(v) for k, v in outer.items()})
-    ) + tuple(({}, {k: [v] for k, v in one.items()}) for one in target.also))  # fmt: skip
+    whole = Space(base, folder, known, tuple(_parts(target, base, folder, known)))
     if not whole.size:
         raise BadInput(
-            f"no printable value of {', '.join(_empty(whole, outer))} in its range: expected a whole layer or half "
+            f"no printable value of {', '.join(_empty(whole, target))} in its range: expected a whole layer or half "
             "line in it"
         )
     return whole
 
 
-def _empty(whole: Space, outer: Mapping[str, Range | list[Value]]) -> list[str]:
+def _parts(target: Target, base: Data, folder: Path, known: frozenset[str]) -> Iterator[Part]:
+    """Choices, as of a nozzle, which set the grid of lengths, with the values on it; then further single designs."""
+    lengths_of_shape = {key: given for key, given in target.parameters.items() if key in known}
+    others = {key: _listed(given) for key, given in target.parameters.items() if key not in known}
+    for chosen in _combinations(others):
+        yield chosen, {
+            key: _values(key, given, with_own_files(_with(base, known, chosen), folder))
+            for key, given in lengths_of_shape.items()
+        }
+    for one in target.also:
+        yield {}, {key: [value] for key, value in one.items()}
+
+
+def _empty(whole: Space, target: Target) -> list[str]:
     """Parameters without a printable value."""
-    inner = {k for _, inside in whole.parts for k, values in inside.items() if not values}
-    return sorted(inner | {k for k, v in outer.items() if not _listed(v)})
+    inner = {key for _, inside in whole.parts for key, values in inside.items() if not values}
+    outer = {key for key, given in target.parameters.items() if key not in whole.lengths and not _listed(given)}
+    return sorted(inner | outer)
 
 
 def _refuse_unknown(target: Target, known: frozenset[str]) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from itertools import filterfalse
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -64,6 +65,10 @@ class Number:
             value = Bounds.of(value, self.unit, model=wide.model.times(value / wide.value) if wide else None)
         bounds: Bounds = value.times(1 / self.size, self.unit)
         return bounds
+
+    def of_print(self, trial: Trial) -> Bounds | None:
+        """Value of the print of a trial; None where unknown."""
+        return self.of(trial.printed, trial.toolpath)
 
     def uninformed(self, trial: Trial) -> float:
         """The error without any reading, length or load over sqrt(12) [unit of the name]; infinite of other numbers."""
@@ -232,18 +237,19 @@ class Target(Strict):
 
     def violated(self, trial: Trial) -> dict[str, float]:
         """Constraints that a trial violates, and by how much, relative [-]."""
-        found = {f"check {f.rule}": 1.0 for f in trial.findings if self.refuses(f.severity, f.rule)}
+        beyond = {f"check {f.rule}": 1.0 for f in trial.findings if self.refuses(f.severity, f.rule)}
         if trial.status != "predicted":
-            found[trial.status] = 1.0
-        found |= {f"doubt: {d}": 1.0 for d in trial.doubts if not self.accepts(d)}
-        for key, limit in self.limits.items():
-            value = NUMBERS[key].of(trial.printed, trial.toolpath)
-            if beyond := 1.0 if value is None else limit.beyond(value.value):
-                found[f"limit {key}"] = beyond
+            beyond[trial.status] = 1.0
+        beyond |= {f"doubt: {doubt}": 1.0 for doubt in filterfalse(self.accepts, trial.doubts)}
+        beyond |= {f"limit {key}": share for key in self.limits if (share := self._beyond_limit(key, trial))}
         if trial.status == "predicted":
-            unknown = (k for k in self.objectives if NUMBERS[k].of(trial.printed, trial.toolpath) is None)
-            found |= {f"unknown {key}": 1.0 for key in unknown}
-        return found
+            beyond |= {f"unknown {key}": 1.0 for key in self.objectives if NUMBERS[key].of_print(trial) is None}
+        return beyond
+
+    def _beyond_limit(self, key: str, trial: Trial) -> float:
+        """Distance of a number beyond its limit, relative [-]; 1 of an unknown one."""
+        value = NUMBERS[key].of_print(trial)
+        return 1.0 if value is None else self.limits[key].beyond(value.value)
 
     def accepts(self, doubt: str) -> bool:
         """Test whether there is no doubt, or an accepted one."""
