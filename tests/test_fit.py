@@ -45,10 +45,10 @@ def value(made, quantity):
 
 @pytest.fixture(scope="module")
 def of_thesis(tmp_path_factory):
-    from sensorgen.measure.log import importing
+    from sensorgen.measure.log import exchange
 
     with Log(tmp_path_factory.mktemp("fit") / "log.db", create=True) as log, roughly_at_rest():
-        importing.thesis(log)
+        exchange.thesis(log)
         return fit(log, 23)
 
 

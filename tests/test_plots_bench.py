@@ -14,7 +14,7 @@ from sensorgen.analysis.plots.figure import thinned
 from sensorgen.measure.recording import Recording, RecordingClock, Source
 from sensorgen.measure.recording.samples import blank
 from sensorgen.measure.signal import lowpass, presses
-from sensorgen.measure.signal.schedule import RunPlan
+from sensorgen.measure.signal.presses import RunPlan
 
 
 @pytest.fixture(scope="module")

@@ -30,7 +30,7 @@ from sensorgen.design.specimen_name import QUALITIES
 from sensorgen.export.gcode.reading import Source
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.entries import Reading
-from sensorgen.measure.log.importing import thesis_readings
+from sensorgen.measure.log.exchange import thesis_readings
 from sensorgen.measure.signal.verdicts import ORDER
 
 CREDIBLE = 0.9  # share of the posterior inside the interval

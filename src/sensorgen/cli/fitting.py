@@ -145,10 +145,10 @@ def fit_command(
 @contextmanager
 def _thesis() -> "Iterator[Log]":
     """A log of Table D.1 alone that is not kept."""
-    from sensorgen.measure.log import Log, importing
+    from sensorgen.measure.log import Log, exchange
 
     with TemporaryDirectory() as folder, Log(Path(folder) / "log.db", create=True) as log:
-        importing.thesis(log)
+        exchange.thesis(log)
         yield log
 
 

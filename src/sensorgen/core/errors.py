@@ -66,8 +66,7 @@ class UnknownName(SensorgenError):
     def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
         """Name the nearest of ``known`` to ``given``, and list them all."""
         names = sorted(known)
-        near = nearest(given[:100], names)
-        hint = f"; did you mean '{near}'?" if near else "."
+        hint = f"; did you mean '{near}'?" if (near := nearest(given[:100], names)) else "."
         super().__init__(f"unknown {kind} {given[:100]!r}{hint} Known: {', '.join(names)}")
 
 

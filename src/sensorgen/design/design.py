@@ -18,7 +18,7 @@ from sensorgen.core import lazy as registry
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, problem, shown, stated
-from sensorgen.design import imported, packs, shapes
+from sensorgen.design import borders, imported, packs, shapes
 from sensorgen.design import materials as material_files
 from sensorgen.design.effects import Effects, TipData
 from sensorgen.design.packs import Kind
@@ -256,11 +256,7 @@ class Design(Strict):
 
             return arrays.scene(self.layout, Fill(**names), self.crossing.form.scene, self.crossing.params)
         scene = self.form.scene(self.params, Fill(**names))
-        if not self.border:
-            return scene
-        from sensorgen.design import borders
-
-        return borders.cut(scene, self.border)
+        return borders.cut(scene, self.border) if self.border else scene
 
     @cached_property
     def layout(self) -> "ArrayLayout | None":
@@ -294,12 +290,7 @@ class Design(Strict):
     @property
     def area_mm2(self) -> float:
         """Area of the sensor in plan [mm2]."""
-        if not self.border:
-            return self.params.length_mm * self.params.width_mm
-        from sensorgen.design import borders
-
-        area: float = borders.region(self.border).area
-        return area
+        return borders.region(self.border).area if self.border else self.params.length_mm * self.params.width_mm
 
     @cached_property
     def unbordered(self) -> "Design":
@@ -584,12 +575,8 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
 
 def with_own_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     """A design's data with the content of all files in place of their names, relative to a folder."""
-    data = imported.with_geometry(packs.with_files(with_own(_one_dielectric(data), folder), folder), folder)
-    if "border" not in data:
-        return data
-    from sensorgen.design import borders
-
-    return borders.with_border(data, folder)
+    data = packs.with_files(with_own(_one_dielectric(data), folder), folder)
+    return borders.with_border(imported.with_geometry(data, folder), folder)
 
 
 def _one_dielectric(data: dict[str, Any]) -> dict[str, Any]:

@@ -58,12 +58,13 @@ class Shape(Protocol):
         """Bodies for parameters and materials."""
 
 
-def _not_trusted(name: str, text: str) -> NotTrusted:
-    return NotTrusted(
-        f"{name}.py is not trusted and did not run: a shape is a program; read it, then: sensorgen pack trust "
-        f"shapes/{name}.py (its file, or the design's that contains it), and again after each change; SHA-256 "
-        f"{digest(text)}"
-    )
+def _refuse_untrusted(name: str, text: str) -> None:
+    if not is_trusted(text):
+        raise NotTrusted(
+            f"{name}.py is not trusted and did not run: a shape is a program; read it, then: sensorgen pack trust "
+            f"shapes/{name}.py (its file, or the design's that contains it), and again after each change; SHA-256 "
+            f"{digest(text)}"
+        )
 
 
 def load(name: str, text: str) -> Shape:
@@ -76,8 +77,7 @@ def load(name: str, text: str) -> Shape:
     BadInput
         The file is no shape; the message names its line.
     """
-    if not is_trusted(text):
-        raise _not_trusted(name, text)
+    _refuse_untrusted(name, text)
     return _foreign(name, text)
 
 
@@ -285,8 +285,7 @@ class _ShapeProcess:
     """The process that runs one shape's file."""
 
     def __init__(self, name: str, text: str) -> None:
-        if not is_trusted(text):
-            raise _not_trusted(name, text)
+        _refuse_untrusted(name, text)
         self.name = name
         self._process = subprocess.Popen(  # noqa: S603 - this very program
             [sys.executable, "-I", "-S", "-B", shape_process.__file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE,

@@ -218,8 +218,8 @@ def _of_part(entry: BenchRun, lockins: "Sequence[Recording]", pressed: "RigLog |
     for recording, with_rig in zip(lockins, beside, strict=True):
         done = processed(recording, with_rig)
         one, counts = done.recording, done.recording.counts()
-        marked = {name: count for name, count in counts.items() if count and name not in ("samples", "valid")}
-        marks = (f"{count} samples marked: {name}" for name, count in marked.items())
+        marked = (name for name, count in counts.items() if count and name not in ("samples", "valid"))
+        marks = (f"{counts[name]} samples marked: {name}" for name in marked)
         notes = (*filter(None, [without]), *done.notes, *marks)
         valid = one.valid()
         rest, spread, scatter = _at_rest(done.pairs.before_ohm if done.pairs else one.impedance_ohm[valid])

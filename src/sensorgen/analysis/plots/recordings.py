@@ -30,9 +30,8 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.measure.signal.presses import Pairs, Surface
+    from sensorgen.measure.signal.presses import Pairs, Step, Surface
     from sensorgen.measure.signal.run import Hysteresis
-    from sensorgen.measure.signal.schedule import Step
 
 PARTS = {"resistance": ("R", "real"), "reactance": ("X", "imag")}
 _TIME, _FORCE, _POSITION = Axis("time [s]"), Axis("force [N]"), Axis("position [mm]")
@@ -163,8 +162,7 @@ def compared(
         f"Change of R and of X by each load of {len(runs)} recordings over its force: 0 is the least and 1 the largest "
         f"change ({how}).{left_out}"
     )
-    title = f"Normalised differences under load, {how}"
-    return Figure.by_frequency(key, title, alt, tones_hz, panels, columns=2)
+    return Figure.by_frequency(key, f"Normalised differences under load, {how}", alt, tones_hz, panels, columns=2)
 
 
 def hysteresis(loads: "Mapping[float, Hysteresis]", tones_hz: Real, name: str) -> Figure:

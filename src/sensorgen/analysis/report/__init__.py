@@ -196,7 +196,7 @@ def report(
     step("page")
     return Report(
         iteration, specimens, datetime.now(UTC).isoformat(timespec="seconds"),
-        (*headline, *recordings.headline(impedances), *_basis(comparison, recorded)), findings,
+        (*headline, *recordings.headline(impedances), *_basis(comparison, recorded, len(names))), findings,
         tuple(s for s in sections if any((s.tables, s.figures, s.drawings))),
     )  # fmt: skip
 
@@ -208,12 +208,11 @@ def _untrusted(left_out: Sequence[tuple[str, str]]) -> Iterator[str]:
         yield f"Not compared: {names[0]}{f' and {len(names) - 1} more' if names[1:] else ''}: {why}."
 
 
-def _basis(comparison: Comparison, recorded: Sequence[RecordedRun]) -> Iterator[str]:
+def _basis(comparison: Comparison, recorded: Sequence[RecordedRun], specimens: int) -> Iterator[str]:
     """Summary of the measurements, in one sentence; none of a single reading."""
-    specimens = {row.reading.specimen for row in comparison.rows} | {run.entry.specimen for run in recorded}
     if len(comparison.rows) + len(recorded) > 1:
         yield (
-            f"Basis: {len(comparison.rows)} readings and {len(recorded)} recordings; specimens: {len(specimens)}; "
+            f"Basis: {len(comparison.rows)} readings and {len(recorded)} recordings; specimens: {specimens}; "
             f"designs: {len(comparison.predictions)}."
         )
 
@@ -267,8 +266,7 @@ def _sections(
         parts = (history.calibration_table(calibrated), history.CALIBRATION_NOTE)
         yield PageSection("calibrated", "Calibrated specimens", (), parts)
     if recorded:
-        figures = tuple(recordings.figures(recorded))
-        yield PageSection("recorded", "Recordings", figures, (recordings.facts(recorded),))
+        yield PageSection("recorded", "Recordings", tuple(recordings.figures(recorded)), (recordings.facts(recorded),))
     figures = () if alone else tuple(variants.figures(comparison))
     yield PageSection(
         "variants", "The variants", figures, variants.identifiability(comparison), variants.drawings(comparison)

@@ -42,13 +42,13 @@ def latest(log: Log, specimens: Container[str], left_out: list[tuple[str, str]])
     """The latest calibration of each specimen; those that cannot be read go to ``left_out``."""
     rows = {row.specimen: row for row in log.entries(Row) if row.specimen in specimens}
     calibrated = []
-    for name, row in rows.items():
+    for row in rows.values():
         from sensorgen.prediction.calibration.calibration import from_json
 
         try:
             calibrated.append(from_json(row.data))
         except BadInput as error:
-            left_out.append((f"calibration {row.number}, {name}", str(error)))
+            left_out.append((f"calibration {row.number}, {row.specimen}", str(error)))
     return calibrated
 
 

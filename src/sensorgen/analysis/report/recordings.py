@@ -189,8 +189,7 @@ def figures(recorded: Sequence[RecordedRun]) -> Iterator[Figure]:
     """Differences of all recordings on a scale of their own, then each recording over time and over loads."""
     yield from compared(recorded)
     for run in recorded:
-        part = f"-{run.source.part}" if run.source.part else ""
-        key = f"{run.entry.number}-{run.source.lockin}{part}"
+        key = f"{run.entry.number}-{run.source.lockin}" + f"-{run.source.part}" * bool(run.source.part)
         yield plots.series(run, f"series-{key}")
         for part in plots.PARTS:
             try:

@@ -11,8 +11,7 @@ from sensorgen.analysis.plots.figure import BLUE, BROWN, GREY, MOST_POINTS, PURP
 from sensorgen.analysis.report.alternating import BAKED
 from sensorgen.analysis.report.electrodes import VERDICT_COLOURS, usable
 from sensorgen.core.document import Cell, Column, Table
-from sensorgen.measure.signal.verdicts import ORDER, REACTANCES, WORDS, Evidence
-from sensorgen.measure.signal.yields import CountShare, Group, dependence, groups
+from sensorgen.measure.signal.verdicts import ORDER, REACTANCES, WORDS, CountShare, Evidence, Group, dependence, groups
 from sensorgen.prediction.query import TONES_HZ
 
 _LOOKS = {  # none with the colour of a verdict

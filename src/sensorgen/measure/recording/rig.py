@@ -457,7 +457,7 @@ def _refuse_apart(time: Real, rig: RigLog, offset: Offset) -> None:
     """Refuse clocks whose offset is unknown, unless half of the shorter record lies in the other, as if they agreed."""
     rows = rig.sound()[0]
     common = min(time[-1], rows[-1]) - max(time[0], rows[0])
-    if common < 0.5 * min(np.ptp(time), np.ptp(rows)):
+    if not common >= 0.5 * min(np.ptp(time), np.ptp(rows)):
         raise BadInput(
             f"the force explains {offset.explained:.1%} of the readings: too little to find the offset of the "
             "clocks; expected time stamps, or times of both files that count from the same moment"

@@ -20,8 +20,7 @@ from sensorgen.core.parallel import Lane, open_lanes, remembered, said
 from sensorgen.workflows.moves import Candidate, Search
 from sensorgen.workflows.optimise import ladder
 from sensorgen.workflows.optimise.ladder import AT_REST, COARSE
-from sensorgen.workflows.optimise.space import Space
-from sensorgen.workflows.optimise.target import NUMBERS, Target
+from sensorgen.workflows.optimise.target import NUMBERS, Space, Target
 from sensorgen.workflows.trial import Trial
 
 MARGIN = 1.5  # between a number on the coarse mesh and its best value; widened where a design shows more

@@ -25,8 +25,7 @@ from sensorgen.workflows.moves import Candidate, EarlyNumber
 from sensorgen.workflows.optimise import ladder
 from sensorgen.workflows.optimise.front import HERE, Front, Progress, Workers, sample, search, settled, value_of, worth
 from sensorgen.workflows.optimise.result import Chosen, ObjectiveSpread, Optimised, Recommended, chosen, leads, result
-from sensorgen.workflows.optimise.space import Space, candidates, grid_mm, space
-from sensorgen.workflows.optimise.target import NUMBERS, Target, load
+from sensorgen.workflows.optimise.target import NUMBERS, Space, Target, candidates, grid_mm, load, space
 from sensorgen.workflows.slice import slice_design
 from sensorgen.workflows.trial import trial
 

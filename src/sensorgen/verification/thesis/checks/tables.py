@@ -13,7 +13,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design import materials, printer
 from sensorgen.design.shapes import reference
-from sensorgen.measure.log import importing as readings
+from sensorgen.measure.log import exchange as readings
 from sensorgen.measure.log.entries import Reading
 from sensorgen.measure.signal.verdicts import Evidence, verdict
 from sensorgen.prediction import rest_state
