@@ -30,7 +30,7 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.measure.signal.presses import Pairs, Step, Surface
+    from sensorgen.measure.signal.presses import Pairs, Step
     from sensorgen.measure.signal.run import Hysteresis
 
 PARTS = {"resistance": ("R", "real"), "reactance": ("X", "imag")}
@@ -91,13 +91,6 @@ def _line(name: str, time_s: Real, values: Real, colour: str) -> Curve:
     return Curve("line", name, time_s[at], values[at], colour=colour)
 
 
-def difference_surface(pairs: "Pairs", part: str) -> "Surface":
-    """Change of "resistance" or "reactance" by the loads, over force and position [ohm]."""
-    from sensorgen.measure.signal.presses import surface
-
-    return surface(pairs.force_n, pairs.position_mm, getattr(pairs.difference_ohm, PARTS[part][1]))
-
-
 def differences(run: DrawnRecording, part: str, key: str = "") -> Figure:
     """Change of "resistance" or "reactance" by the loads over force and position, at each frequency.
 
@@ -106,10 +99,12 @@ def differences(run: DrawnRecording, part: str, key: str = "") -> Figure:
     BadInput
         As :func:`sensorgen.measure.signal.presses.surface`; no loads.
     """
-    pairs = run.pairs
+    from sensorgen.measure.signal.presses import surface
+
+    pairs, (symbol, share) = run.pairs, PARTS[part]
     if pairs is None:
         raise BadInput(f"{run.name}: no loads of known force")
-    through, symbol = difference_surface(pairs, part), PARTS[part][0]
+    through = surface(pairs.force_n, pairs.position_mm, getattr(pairs.difference_ohm, share))
 
     def panels(k: int, at: str) -> Iterator[Panel]:
         divisor, unit = scale(through.values[..., k], "Ω")
