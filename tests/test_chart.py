@@ -1,13 +1,9 @@
 """Speed against accuracy: what is measured, the front, and the pictures."""
 
 import csv
-import html as entities
 import json
 import math
-import os
-import re
 import shutil
-import subprocess
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -546,40 +542,12 @@ def test_the_front_is_drawn_as_a_staircase():
     assert steps == [(1.0, 0.5), (2.0, 0.5), (2.0, 0.1), (4.0, 0.1), (4.0, 0.01)]
 
 
-PROBE = """<head><script>
-const said = [];
-window.addEventListener("error", e => said.push(e.message));
-console.error = (...a) => said.push(a.join(" "));
-window.addEventListener("load", () => setTimeout(() => {
-  const pre = document.createElement("pre");
-  pre.id = "probe";
-  pre.textContent = JSON.stringify({said, resources: performance.getEntriesByType("resource").length,
-    names: [...document.querySelectorAll(".plot")].flatMap(p => p.data.map(t => t.name)).filter(n => n),
-    marks: document.querySelectorAll("path.point").length});
-  document.body.replaceChildren(pre);
-}, 500));
-</script>"""
-
-
-def test_the_page_in_a_browser(measured, tmp_path):
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("chromium is not installed (Debian: apt install chromium)")
-    (tmp_path / "page.html").write_text(pictures.html(measured).replace("<head>", PROBE, 1), "utf-8")
-    done = subprocess.run(
-        [
-            chromium, "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-            "--virtual-time-budget=10000", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom",
-            (tmp_path / "page.html").as_uri(),
-        ],
-        capture_output=True, encoding="utf-8", timeout=300, env={**os.environ, "HOME": str(tmp_path)},
-    )  # fmt: skip
-    found = re.search('<pre id="probe">(.*?)</pre>', done.stdout, re.DOTALL)
-    assert found, done.stderr[-2000:]
-    report = json.loads(entities.unescape(found[1]))
-    assert (report["said"], report["resources"]) == ([], 0)
-    assert set(report["names"]) == {p.model for p in measured} | {"Pareto front"}
-    assert report["marks"] == len(measured)
+def test_the_page_in_a_browser(measured, tmp_path, browser):
+    (tmp_path / "page.html").write_text(pictures.html(measured), "utf-8")
+    browser.open(tmp_path / "page.html", ready=f"document.querySelectorAll('path.point').length === {len(measured)}")
+    names = "[...document.querySelectorAll('.plot')].flatMap(p => p.data.map(t => t.name)).filter(n => n)"
+    assert set(browser.run(names)) == {p.model for p in measured} | {"Pareto front"}
+    assert (browser.complaints(), browser.asked()) == ([], [])
 
 
 def test_the_command(tmp_path):
