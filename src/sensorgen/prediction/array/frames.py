@@ -362,12 +362,16 @@ class MapInverter:
     @property
     def faults(self) -> tuple[str, ...]:
         """Breaks and shorts that the readings at rest show, as in :func:`faulty`."""
-        tracks, words = self._tracks, [f"r{i + 1}c{j + 1}" for i, j in np.argwhere(self.leaks_s > 0).tolist()]
-        for letter, stretches, leads in (
-            ("r", tracks.row_ohm, tracks.row_lead_ohm), ("c", tracks.column_ohm.T, tracks.column_lead_ohm)
-        ):  # fmt: skip
-            words += [f"{letter}{track + 1}:{after + 1}" for track, after in np.argwhere(np.isinf(stretches)).tolist()]
-            words += [f"{letter}{track + 1}:0" for track in np.flatnonzero(np.isinf(leads)).tolist()]
+        whole, read = self.model.tracks(), self._tracks
+        words = [f"r{i + 1}c{j + 1}" for i, j in np.argwhere(self.leaks_s > 0).tolist()]
+        for letter, side in (("r", "row"), ("c", "column")):
+            stretches, leads = (
+                np.isinf(getattr(read, f"{side}_{part}")) & np.isfinite(getattr(whole, f"{side}_{part}"))
+                for part in ("ohm", "lead_ohm")
+            )
+            stretches = stretches if side == "row" else stretches.T
+            words += [f"{letter}{track + 1}:{after + 1}" for track, after in np.argwhere(stretches).tolist()]
+            words += [f"{letter}{track + 1}:0" for track in np.flatnonzero(leads).tolist()]
         return tuple(words)
 
     @cached_property
