@@ -266,7 +266,7 @@ def _turned(side_mm: float) -> float:
 def _moment_m2(cell: ContactCell, stress_pa: float, fineness: Fineness) -> float:
     """Mean square of the distance from the middle, weighted with what the faces push [m2]."""
     boundary = BoundaryConditions(top="rigid")
-    _, run = press2d._solved(cell, _SOLIDS, [0.0, stress_pa], boundary, fineness, lambda _: None)
+    _, run = press2d._solved(cell, _SOLIDS, [0.0, stress_pa], boundary, fineness)
     state = run.states[-1]
     places = run.problem.places(state.u_m)
     here = run.problem.faces.rays(places).here_m
