@@ -39,6 +39,16 @@ VERDICTS = {
     "unexplained": "it differs for an unknown reason: report it",
 }
 
+_FEW = 3  # parts, or complex values in a part, that are all shown
+_FEW_REAL = 8
+_NONE = "no number"
+_NOISE = 1e-9  # below this share of what is large, a number is what rounding left
+
+MINUS, ELLIPSIS = "\u2212", "\u2026"
+
+_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+_PREFIXED = ("A", "C", "F", "Hz", "N", "Pa", "S", "V", "m", "ohm")  # units that take one, alone or over something
+
 
 def markdown(rows: Sequence[ReproducedItem]) -> str:
     """The whole page."""
@@ -157,17 +167,6 @@ def _values(values: ArrayLike | None) -> Any:
     plain = array.astype(object)
     plain[~np.isfinite(array)] = None
     return plain.tolist()
-
-
-_FEW = 3  # parts, or complex values in a part, that are all shown
-_FEW_REAL = 8
-_NONE = "no number"
-_NOISE = 1e-9  # below this share of what is large, a number is what rounding left
-
-MINUS, ELLIPSIS = "\u2212", "\u2026"
-
-_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
-_PREFIXED = ("A", "C", "F", "Hz", "N", "Pa", "S", "V", "m", "ohm")  # units that take one, alone or over something
 
 
 def thesis_values(parts: Sequence[ItemPart], tolerance: float) -> list[str]:

@@ -27,6 +27,20 @@ KINDS: tuple[Kind, ...] = ("equation", "figure", "table", "claim")
 
 Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]*$", examples=["one line without control characters"])]
 
+AGREES = "agrees"
+MISPRINT = "misprint confirmed"
+DIFFERS = "differs"
+TRANSCRIBED = "transcribed"
+NOT_COVERED = "not covered"
+LOST = "cannot be reproduced"
+UNEXPLAINED = "unexplained"  # an error of ours until somebody knows better
+WORDS = (AGREES, MISPRINT, DIFFERS, TRANSCRIBED, NOT_COVERED, LOST, UNEXPLAINED)
+JUDGED = (AGREES, MISPRINT, DIFFERS)  # compared with something that does not come from the number itself
+
+MOST_DIGITS = 9  # what is left is rounding, which machines do differently
+
+Numbers = NDArray[Any]
+
 
 class ThesisItem(Strict):
     """One numbered thing, or a claim of a section's text.
@@ -90,21 +104,6 @@ def chapter(name: str) -> Chapter:
 def table(number: str) -> dict[str, Any]:
     """Values of a table of the thesis, as the chapters keep it."""
     return next(item.given for item in chapter(number.partition(".")[0]).tables if item.number == number)
-
-
-AGREES = "agrees"
-MISPRINT = "misprint confirmed"
-DIFFERS = "differs"
-TRANSCRIBED = "transcribed"
-NOT_COVERED = "not covered"
-LOST = "cannot be reproduced"
-UNEXPLAINED = "unexplained"  # an error of ours until somebody knows better
-WORDS = (AGREES, MISPRINT, DIFFERS, TRANSCRIBED, NOT_COVERED, LOST, UNEXPLAINED)
-JUDGED = (AGREES, MISPRINT, DIFFERS)  # compared with something that does not come from the number itself
-
-MOST_DIGITS = 9  # what is left is rounding, which machines do differently
-
-Numbers = NDArray[Any]
 
 
 @dataclass(frozen=True)
