@@ -139,7 +139,8 @@ class DesignChart(Displayed):
     def parts(self, key: str) -> Iterator[Part]:
         """The table of one question."""
         here = [p for p in self.points if p.question == key]
-        yield Table.of(key, f"{self.titles[key]}: relative error; time of the processor", here)
+        if here:
+            yield Table.of(key, f"{self.titles[key]}: relative error; time of the processor", here)
         yield from _against(here)
         yield from (f"error larger than stated: {p.words()}" for p in here if p.contradicted)
         if silent := [(s.model, s.why) for s in self.silent if s.question == key]:
@@ -151,10 +152,11 @@ class DesignChart(Displayed):
         return [f"{p.words()}: error {p.error:.2g}, {p.stated:.2g} stated" for p in wrong]
 
     def csv(self) -> Iterator[str]:
-        """All points in one table."""
+        """All points in one table; nothing without any."""
         from sensorgen.core.document import comma_separated
 
-        yield comma_separated(Table.of("chart", "", self.points))
+        if self.points:
+            yield comma_separated(Table.of("chart", "", self.points))
 
 
 def _against(points: Sequence[Point]) -> Iterator[str]:
