@@ -22,7 +22,7 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError
 from sensorgen.models import fem3d
 from sensorgen.verification import chart
-from sensorgen.verification.chart import blocks, cells, exact, lines, membrane, networks, presses, rounds
+from sensorgen.verification.chart import cells, elastic, lines, networks, presses
 from sensorgen.verification.chart import measured as measured_in
 from sensorgen.verification.chart import plot as pictures
 from sensorgen.verification.chart.cells import STANDARD
@@ -124,19 +124,19 @@ def test_textbook_scenes_are_met():
         return a
 
     for k in (0.1, 0.7, 0.99):
-        assert exact._ratio(k) == pytest.approx(mean(1, k) / mean(1, math.sqrt(1 - k * k)), rel=1e-12)
+        assert cells._ratio(k) == pytest.approx(mean(1, k) / mean(1, math.sqrt(1 - k * k)), rel=1e-12)
     pytest.importorskip("ngsolve", reason="the extra fem is not installed")
     from sensorgen.models import fem2d
 
     def off(case):
-        found = fem2d.capacitance(case.scene, exact.PERMITTIVITY, 1e-5).middle()
+        found = fem2d.capacitance(case.scene, cells.PERMITTIVITY, 1e-5).middle()
         return abs(found / (case.capacitance_f_per_m2 * case.scene.size_mm[0] * 1e-6) - 1)
 
-    for case in (exact.stripline(), exact.interdigital()):
+    for case in (cells.stripline(), cells.interdigital()):
         assert off(case) < 1e-6
-    for circles in (exact.coaxial, exact.eccentric):
+    for circles in (cells.coaxial, cells.eccentric):
         errors = [off(circles(corners)) for corners in (3, 6)]
-        assert errors[1] * (6 / exact.CORNERS) ** 3 < circles().known_to
+        assert errors[1] * (6 / cells.CORNERS) ** 3 < circles().known_to
         assert errors[0] / errors[1] > 6
 
 
@@ -307,7 +307,7 @@ def test_blocks_have_the_stress_of_their_energy(name, law, columns):
     """W = mu/2 (a1^2 + a2^2 + a3^2 - 3) at constant volume, differentiated by numbers;
     B.49 and springs, which are stiffer by 1 / (1 - nu^2) along x, are off by its bend.
     """
-    standard = blocks.STANDARD[name]()
+    standard = elastic.BLOCKS[name]()
     b, mu = 1 - standard.down_m / 1.2e-3, 2e6
 
     def energy(b):
@@ -327,8 +327,8 @@ def test_a_bonded_strip_is_as_stiff_as_was_found_elsewhere():
     """Gent and Lindley are 1.6 % off; both programs come nearer with their meshes."""
     monkey = pytest.MonkeyPatch()
     with monkey.context() as patch:
-        patch.setattr(blocks, "_PIECES", (1, 2))
-        patch.setattr(blocks, "_MESHES", blocks._MESHES[:2])
+        patch.setattr(elastic, "_PIECES", (1, 2))
+        patch.setattr(elastic, "_MESHES", elastic._MESHES[:2])
         coarse, fine = by_model("bonded strip", 1e9)
     assert coarse["compression: bonded"].error == pytest.approx(0.0156, abs=2e-4)
     assert set(fine) >= {"compression: bonded", "press3d"}
@@ -348,22 +348,22 @@ def test_what_faults_is_not_shown():
     def faulty():
         return SimpleNamespace(faults=("a fault",), displacement_m=np.zeros(2))
 
-    levels = [("", lambda: blocks._displacement_m(faulty()))]
+    levels = [("", lambda: elastic._displacement_m(faulty()))]
     assert not list(measured_in.climbed("s", [("press2d", levels)], measured_in.relative(1.0, 0.0), 1.0))
 
 
 def test_cooks_membrane_converges():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(membrane, "_CELLS", (4, 8, 16))
-        found = [p.error for p in membrane.points("Cook's membrane", 1e9)]
+        patch.setattr(elastic, "_CELLS", (4, 8, 16))
+        found = [p.error for p in elastic.MEMBRANE.points("Cook's membrane", 1e9)]
     assert found[0] == pytest.approx(0.041, abs=1e-3)
     assert all(3 * b < a < 5 * b for a, b in pairwise(found))  # its corners are singular
-    assert len(membrane.points("Cook's membrane", 0.0)) == 1
+    assert len(elastic.MEMBRANE.points("Cook's membrane", 0.0)) == 1
 
 
 def test_a_cylinder_touches_as_hertz_says():
     """Contact of 40 um: the load that Johnson's Eq. 4.43 asks for, from the other side."""
-    load = rounds._load_n_per_m()
+    load = elastic._load_n_per_m()
     modulus = 6e6 / (1 - 0.3**2)
     assert 4 * math.sqrt(load * 1e-3 / (math.pi * modulus)) == pytest.approx(4e-5, rel=1e-12)
     coarse, _ = by_model("cylinder on a flat")
@@ -460,7 +460,7 @@ def test_every_scene_has_a_question_and_reasons(name):
     kind = chart.kind_of(name)
     reasons = kind.why_not_applicable(name)
     assert set(reasons) <= set(models.names())
-    assert kind.ASKED
+    assert kind.asked
     assert len(chart.SCENES) == len(set(chart.SCENES))
 
 

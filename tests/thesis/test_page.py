@@ -7,9 +7,7 @@ from html.parser import HTMLParser
 import pytest
 
 from sensorgen.verification import thesis
-from sensorgen.verification.thesis.items import ThesisItem
-from sensorgen.verification.thesis.reproduced import ReproducedItem
-from sensorgen.verification.thesis.verdicts import AGREES, ItemPart, ItemVerdict
+from sensorgen.verification.thesis.items import AGREES, ItemPart, ItemVerdict, ReproducedItem, ThesisItem
 
 VOID = {"meta", "input", "link"}
 
