@@ -150,8 +150,7 @@ def _name(entry: BenchRun, source: "Source") -> str:
     """Specimen, the recording's number in the log, and whether it is simulated."""
     part = f", part {source.part}" if source.part else ""
     lockin = f", lock-in {source.lockin}" if source.lockin > 1 else ""
-    simulated = ", simulated" if entry.simulated else ""
-    return f"{entry.specimen}, recording {entry.number}{part}{lockin}{simulated}"
+    return f"{entry.specimen}, recording {entry.number}{part}{lockin}{', simulated' * entry.simulated}"
 
 
 def runs(
