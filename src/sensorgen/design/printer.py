@@ -79,6 +79,10 @@ class Control(Strict):
     firmware_retraction: bool = False  # G10 and G11 instead of moves of E
     commands: dict[str, Line | None] = Field(default={})  # that a print may send, beside its firmware's; null: not
 
+    def added(self) -> set[str]:
+        """Commands beside the firmware's that a print may send."""
+        return {command for command, words in self.commands.items() if words is not None}
+
 
 class Printer(Strict):
     """A multi-tool printer; ``tool_numbers`` are those of its own G-code."""
@@ -243,10 +247,7 @@ def _wider(own: Printer) -> str:
     for limit, of in _LIMITS.items():
         if of(own) > max(map(of, shipped)):
             return f"{limit} {abs(of(own)):g}"
-    allowed = {
-        command for printer in shipped for command, words in printer.control.commands.items() if words is not None
-    }
-    more = sorted(c for c, words in own.control.commands.items() if words is not None and c not in allowed)
+    more = sorted(own.control.added().difference(*(printer.control.added() for printer in shipped)))
     return f"commands {', '.join(more)}" if more else ""
 
 

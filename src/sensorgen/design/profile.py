@@ -85,8 +85,10 @@ def settings_of(path: Path) -> dict[str, Setting]:
         Not readable, or no settings in it.
     """
     text = yamlfile.text(path)
-    if path.suffix == ".json":
-        return _of_json(path, text)
+    return _of_json(path, text) if path.suffix == ".json" else _of_lines(path, text)
+
+
+def _of_lines(path: Path, text: str) -> dict[str, Setting]:
     lines = [line for line in text.splitlines() if line.strip() and line.lstrip()[0] not in "#;["]
     settings = {m[1]: m[2] for line in lines if (m := _LINE.fullmatch(line))}
     if len(settings) < len(lines) or not settings:

@@ -140,15 +140,15 @@ class Material(Strict):
             No source gives it, or only an implausible one that a design must name to get.
         """
         values = self.properties.get(quantity, []) + self.print.get(quantity, [])
-        own = [v for v in values if v.source == SET]
-        chosen = own or [v for v in values if v.source == source] or [v for v in values if v.default]
-        if not chosen:
+        rank = {source: 1, SET: 0}
+        usable = [v for v in values if v.source in rank or v.default]
+        if not usable:
             named = ", ".join(sorted(v.source for v in values))
             unnamed = ": no source gives it; set one with --set or material_values"
             raise MissingValue(
                 f"{self.name} has no default {quantity}" + (f"; name one of its sources: {named}" if named else unnamed)
             )
-        return chosen[0]
+        return min(usable, key=lambda v: rank.get(v.source, 2))
 
     def chosen(self, quantity: str, source: str = "") -> float | None:
         """Number of a quantity as :meth:`value` chooses it; None where it raises."""
@@ -358,8 +358,11 @@ def fault(quantity: str, given: Value, *, advised: bool = False) -> str:
     low, high = _RANGES.get(quantity, (0.0, inf))
     if not low <= given.value <= high or (isinf(given.value) and given.default):
         return f"is {given.value:g}; expected {_said(low, high, 'a number from 0 on')}"
-    if wrong := disorder(given, advised=advised):
-        return wrong
+    return disorder(given, advised=advised) or _implausible(quantity, given)
+
+
+def _implausible(quantity: str, given: Value) -> str:
+    """Fault of a value, or an end of its range, that no solid or print has, unless its file says so; or ""."""
     low, high = _PLAUSIBLE.get(quantity, (-inf, inf))
     for number in (given.value, given.low, given.high):
         if number is not None and not low <= number <= high and not given.implausible:

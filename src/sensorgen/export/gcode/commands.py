@@ -309,8 +309,7 @@ class _Simulation:
                 self._not_homed(f"{code} probes the bed", event.number)
         if code in self.control.ends and not self.ended:
             self.ended, self.end_line = str(event.command), event.number
-        if code in PAUSES:
-            self._pause(event)
+        self._pause(event)
         self.heaters.obey(event, self.tool)
         self._modes(event)
         self._fan(event)
@@ -344,6 +343,8 @@ class _Simulation:
             self.homed -= {axis for axis in AXES if command.has(axis) or not command.has(f"{AXES}E")}
 
     def _pause(self, event: Event) -> None:
+        if event.command.code not in PAUSES:
+            return
         amid = len(self.lines) and self.lines[0] < event.row <= self.lines[-1]
         message = f"{event.command.code} waits for a person to continue"
         message, severity = (f"{message}, with the nozzle at the part", "error") if amid else (message, "info")

@@ -23,7 +23,15 @@ from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Piece, Prism
 from sensorgen.solvers.electrostatics.bounds import Energies, Unsolved
 from sensorgen.solvers.electrostatics.prisms import TOP, balanced, fluxes
-from sensorgen.solvers.electrostatics.round_cell import SAME_MM, DomeTouch, ProfileEdge, RoundCell, profile, touches
+from sensorgen.solvers.electrostatics.round_cell import (
+    SAME_MM,
+    DomeTouch,
+    ProfileEdge,
+    RoundCell,
+    Sized,
+    profile,
+    touches,
+)
 
 ROUND = "round"  # end of the name of faces that elements approach by polynomials
 SIDE, BETWEEN = "side", "between"  # names of mirrors, and of faces between dielectrics
@@ -86,28 +94,20 @@ def mesh_of(cell: RoundCell, order: int, layers: int, closed: float) -> RoundMes
         most 300 000 unknowns fills it.
     """
     try:
-        import netgen.occ as occ
         import ngsolve as ng
-        from netgen.meshing import MeshingParameters, NgException
+        from netgen.meshing import NgException
     except ImportError:
         raise NotInstalled("curved bodies need NGSolve: pip install 'sensorgen[fem]'") from None
     cusps = [(touch, closed * touch.apart_mm) for touch in touches(cell)]
-    try:
-        shape, grading = _shape(cell, cusps)
-        geometry = occ.OCCGeometry(shape)
-    except occ.OCCException as error:
-        raise Unsolved(f"the CAD kernel does not cut this cell: {error}") from None
+    geometry, grading = _geometry(cell, cusps)
     longest = _COARSE * min(np.subtract(cell.high_mm, cell.low_mm)[:2])
     sizes = cell.sizes(np.array(grading.along).reshape(-1, 3), _NEAR, longest)
-    sizes += [size for touch, gap in cusps for size in touch.sizes(cell, gap, _CUSP)]
+    for touch, gap in cusps:
+        sizes += touch.sizes(cell, gap, _CUSP)
     growth = 0.5
     for _ in range(_TRIES):
-        # Threads that wait for each other would take ten times the processor time
-        wanted = MeshingParameters(maxh=longest, grading=growth, parallel_meshing=False, nthreads=1)
-        for size in sizes:
-            wanted.RestrictH(*size)
         try:
-            coarse = geometry.GenerateMesh(wanted)
+            coarse = geometry.GenerateMesh(_wanted(sizes, longest, growth))
         except NgException:
             longest, growth = _FINER * longest, _SLOWER * growth
             continue
@@ -122,10 +122,37 @@ def mesh_of(cell: RoundCell, order: int, layers: int, closed: float) -> RoundMes
         bad = unsound(mesh, order)
         if not bad.any():
             return RoundMesh(cell, mesh, [touch for touch, _ in cusps], rounds)
-        for place in _middles(mesh)[bad]:
-            k = int(((middles - place) ** 2).sum(1).argmin())
-            sizes.append((*middles[k].tolist(), float(spans[k]) / 2))
+        sizes += _halved(middles, spans, _middles(mesh)[bad])
     raise Unsolved("no sound mesh of this cell: faces meet at too small an angle, or are too near each other")
+
+
+def _halved(middles: Real, spans: Real, places: Real) -> Iterator[Sized]:
+    """Sizes that halve the elements of which the middles (n, 3) are nearest to some places."""
+    for place in places:
+        k = int(((middles - place) ** 2).sum(1).argmin())
+        yield (*middles[k].tolist(), float(spans[k]) / 2)
+
+
+def _geometry(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> tuple[Any, "_Grading"]:
+    """Geometry of a cell for the mesher, its edges and tips to be graded marked."""
+    import netgen.occ as occ
+
+    try:
+        shape, grading = _shape(cell, cusps)
+        return occ.OCCGeometry(shape), grading
+    except occ.OCCException as error:
+        raise Unsolved(f"the CAD kernel does not cut this cell: {error}") from None
+
+
+def _wanted(sizes: Sequence[Sized], longest: float, growth: float) -> Any:
+    """Parameters of the mesher: longest edges at some places and everywhere, and their growth."""
+    from netgen.meshing import MeshingParameters
+
+    # Threads that wait for each other would take ten times the processor time
+    wanted = MeshingParameters(maxh=longest, grading=growth, parallel_meshing=False, nthreads=1)
+    for size in sizes:
+        wanted.RestrictH(*size)
+    return wanted
 
 
 def unsound(mesh: Any, order: int) -> Mask:
@@ -219,10 +246,7 @@ def _solids(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> list[t
     import netgen.occ as occ
 
     box = occ.Box(cell.low_mm, cell.high_mm)
-    pieces: dict[int, list[Any]] = {}
-    for _, piece, kind in cell.boxes():
-        pieces.setdefault(kind, []).append(solid(piece) * box)
-    filled = {kind: occ.Fuse(own) if len(own) > 1 else own[0] for kind, own in pieces.items()}
+    filled = _filled(cell, box)
     rest = box
     for shape in filled.values():
         rest = rest - shape
@@ -243,6 +267,16 @@ def _solids(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> list[t
             part = shape * occ.Box(tuple(low), tuple(high)) if len(parts) > 1 else shape
             named.append((f"d{kind - cell.conductors}p{n}", part))
     return named
+
+
+def _filled(cell: RoundCell, box: Any) -> dict[int, Any]:
+    """Pieces of each conductor and dielectric as one solid, cut at the sides of the cell."""
+    import netgen.occ as occ
+
+    pieces: dict[int, list[Any]] = {}
+    for _, piece, kind in cell.boxes():
+        pieces.setdefault(kind, []).append(solid(piece) * box)
+    return {kind: occ.Fuse(own) if len(own) > 1 else own[0] for kind, own in pieces.items()}
 
 
 def solid(piece: Piece) -> Any:
@@ -311,13 +345,20 @@ class _Grading:
     def mark(self, faces: Sequence[Any]) -> None:
         """Mark those of some faces."""
         edges = [edge for face in faces for edge in face.edges if edge.mass > SAME_MM]  # poles have edges of no length
+        ways = self._mark_edges(edges)
+        corners = {_key(vertex.p): vertex for edge in edges for vertex in edge.vertices}
+        for place, vertex in corners.items():
+            if self._is_corner(place, ways.get(place, [])) and self._is_open(np.array(place)):
+                vertex.hpref = 1
+                self.any = True
+
+    def _mark_edges(self, edges: Sequence[Any]) -> dict[tuple[float, ...], list[Real]]:
+        """Mark those of some edges that are open; unit vectors along them from each of their ends."""
         ways: dict[tuple[float, ...], list[Real]] = {}
-        corners, seen = {}, set()
+        seen = set()
         for edge in edges:
             low, high = edge.parameter_interval
             middle = np.array(tuple(edge.Value((low + high) / 2)))
-            ends = {_key(vertex.p): vertex for vertex in edge.vertices}
-            corners.update(ends)
             if _key(middle) in seen:
                 continue
             seen.add(_key(middle))
@@ -325,12 +366,9 @@ class _Grading:
                 edge.hpref = 1
                 self.any = True
                 self.along += [tuple(edge.Value(t)) for t in np.linspace(low, high, 17)]
-                for end in ends:
+                for end in dict.fromkeys(_key(vertex.p) for vertex in edge.vertices):
                     ways.setdefault(end, []).append((middle - end) / np.linalg.norm(middle - end))
-        for place, vertex in corners.items():
-            if self._is_corner(place, ways.get(place, [])) and self._is_open(np.array(place)):
-                vertex.hpref = 1
-                self.any = True
+        return ways
 
     def _is_open(self, place: Real) -> bool:
         height = 1 - (2 * np.arange(_SPHERE) + 1) / _SPHERE

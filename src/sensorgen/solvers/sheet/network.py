@@ -46,19 +46,13 @@ def links(sheet: Sheet, axes: tuple[GridLines, GridLines], patch: SheetPatch | N
     joined = np.array([np.concatenate([*ends[0], film]), np.concatenate([*ends[1], film + 1])])
 
     leak, capacitance, by_film = _film(sheet, axes, patch)
-    sides = enumerate(sheet.sheet_resistance_ohm)
-    ways = [(ohm, *_one_way(axes, along, patch, side)) for side, ohm in sides for along in range(2)]
-    # A perfect conductor's links do not matter.
-    conductance = np.concatenate([value / ohm if ohm else 0 * value for ohm, value, _ in ways])
-    by_sheet = {
-        name: np.concatenate([by.get(name, 0 * value) / ohm if ohm else 0 * value for ohm, value, by in ways])
-        for name in BY
-    }
+    ways = [_one_way(sheet, axes, along, patch, side) for side in range(2) for along in range(2)]
+    conductance = np.concatenate([value for value, _ in ways])
     none, dead = np.zeros(len(film)), np.zeros(len(conductance))
-    slopes = {
-        name: np.array([np.append(by_sheet.get(name, dead), none), np.append(dead, by_film.get(name, none))])
-        for name in (BY if patch else ())
-    }
+    slopes = {}
+    for name in BY if patch else ():
+        by_sheet = np.concatenate([by.get(name, 0 * value) for value, by in ways])
+        slopes[name] = np.array([np.append(by_sheet, none), np.append(dead, by_film.get(name, none))])
     return SheetLinks(joined, np.append(conductance, leak), np.append(dead, capacitance), slopes)
 
 
@@ -127,9 +121,9 @@ def _folded(values: Real) -> Real:
 
 
 def _one_way(
-    axes: tuple[GridLines, GridLines], along: int, patch: SheetPatch | None, side: int
+    sheet: Sheet, axes: tuple[GridLines, GridLines], along: int, patch: SheetPatch | None, side: int
 ) -> tuple[Real, dict[str, Real]]:
-    """Squares in parallel over squares in series, of the links along one axis, and its derivatives.
+    """Conductance of the links along one axis [S], squares in parallel over squares in series, and its derivatives.
 
     Under a patch the link is cut lengthwise: beside the patch it is as it was, and under it two parts are in series.
     """
@@ -137,8 +131,11 @@ def _one_way(
     widths = across.below(across.lines_m[[0, -1]])[1]
     squares = widths[None, :] / ahead.steps_m[:, None]
 
+    ohm = sheet.sheet_resistance_ohm[side]
+
     def turn(values: Real) -> Real:
-        return np.asarray(values if along == 0 else values.T).ravel()
+        turned = np.asarray(values if along == 0 else values.T).ravel()
+        return turned / ohm if ohm else 0 * turned  # a perfect conductor's links do not matter
 
     if patch is None:
         return turn(squares), {}
