@@ -10,8 +10,7 @@ import numpy as np
 import shapely
 
 from sensorgen.asprinted import ledger, nozzle
-from sensorgen.asprinted.beads import Beads, beads
-from sensorgen.asprinted.registration import connected, pieces
+from sensorgen.asprinted.beads import Beads, beads, connected, pieces
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.findings import runs
 from sensorgen.design.design import Design
@@ -71,7 +70,7 @@ def check_motion(design: Design, motion: Motion) -> list[GcodeFinding]:
     Raises
     ------
     BadInput
-        It does not print this design; see :func:`sensorgen.asprinted.registration.pieces`.
+        It does not print this design; see :func:`sensorgen.asprinted.beads.pieces`.
     """
     places, found = pieces(design, motion), list[GcodeFinding]()
     for number, place in enumerate(places, 1):

@@ -20,7 +20,7 @@ from sensorgen.checks.volumes import LayerVolume
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
-from sensorgen.design.walls import WALLS
+from sensorgen.design.profile import WALLS
 from sensorgen.scene.geometry import meshes
 from sensorgen.scene.layers import LayerRegions, drawn, scene_of
 from sensorgen.scene.scene import FLOATING, Body, Point, Scene, seen_from_above
@@ -36,11 +36,10 @@ from shapely.affinity import translate
 
 from sensorgen.core.arrays import Real
 from sensorgen.scene.layers import Region, cleaned, parts
-from sensorgen.scene.repetition import repeat
+from sensorgen.scene.repetition import Band, Slice, affordable, repeat
 from sensorgen.scene.scene import SLIVER_MM, rounded
 from sensorgen.scene.sections import square_to
 from sensorgen.scene.slabs import is_open
-from sensorgen.scene.unit_cell import Band, Slice, affordable
 
 ROUNDED_MM = 2e-3  # edges nearer than this are one: G-code has three decimals
 

@@ -139,57 +139,25 @@ def layers(
     """
     if walls not in RULES:
         raise UnknownName("walls", walls, RULES)
-    laid = laid or {}
     printed: list[LayerRegions] = []
     known: dict[object, Mapping[str, Region]] = {}  # of equal layers, which share their regions
     given = drawn(scene, quality.boundaries_mm(scene.size_mm[2]))
     way = "x" if any(layer.along == "x" for layer in given) else "y"
-    of_bodies = {body.name: laid[body.material] for body in scene.bodies if body.material in laid}
-    stripes = _Stripes(of_bodies, RULES[walls], printer.nozzle_mm, scene.size_mm[0] * scene.size_mm[1], way, shift)
+    sparse = {b.name: laid[b.material] for b in scene.bodies if laid and b.material in laid}
     for number, layer in enumerate(given):
         key = round(layer.height_mm, 12), *((name, id(region)) for name, region in layer.regions.items())
         if key not in known:
-            known[key] = _printed(layer, scene, printer, RULES[walls], laid)
-        printed.append(layer.mapped(stripes.of(layer, known[key], number)))
-    return printed
-
-
-@dataclass(frozen=True)
-class _Stripes:
-    """Sparse infill of a print, as stripes.
-
-    Attributes
-    ----------
-    lines : mapping of str to LineLayout
-        Body to its lines.
-    wide : Rule
-        Width of a line as the walls print it.
-    nozzle_mm, plan_mm2 : float
-        Nozzle, and area of the sensor.
-    way : str
-        Axis of the stripes where a layer has no strips, or is whole.
-    shift : (float, float) or None
-        As of :func:`layers`.
-    """
-
-    lines: Mapping[str, LineLayout]
-    wide: Rule
-    nozzle_mm: float
-    plan_mm2: float
-    way: str
-    shift: Shift | None
-
-    def of(self, layer: LayerRegions, regions: Mapping[str, Region], number: int) -> dict[str, Region]:
-        """Regions of a layer by its number, those of sparse infill in stripes."""
-        striped = dict(regions)
-        for name, mine in self.lines.items():
+            known[key] = _printed(layer, scene, printer, RULES[walls], laid or {})
+        regions = dict(known[key])
+        for name, mine in sparse.items():
             if mine.infill < 1 and name in regions:
-                whole = regions[name].area > self.plan_mm2 * (1 - SLIVER_MM)
-                line_mm = self.wide(mine.line_mm, layer.height_mm, mine.line_mm, self.nozzle_mm)
-                aside = (self.shift or (0.0, mine.infill * (1 - mine.infill)))[number % 2]
-                way = self.way if whole else layer.along or self.way
-                striped[name] = _sparse(regions[name], mine, line_mm, way, aside)
-        return striped
+                whole = regions[name].area > scene.size_mm[0] * scene.size_mm[1] * (1 - SLIVER_MM)
+                line_mm = RULES[walls](mine.line_mm, layer.height_mm, mine.line_mm, printer.nozzle_mm)
+                aside = (shift or (0.0, mine.infill * (1 - mine.infill)))[number % 2]
+                along = way if whole else layer.along or way
+                regions[name] = _sparse(regions[name], mine, line_mm, along, aside)
+        printed.append(layer.mapped(regions))
+    return printed
 
 
 def _sparse(region: Region, lines: LineLayout, line_mm: float, way: str, shift: float) -> Region:

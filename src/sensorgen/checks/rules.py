@@ -52,20 +52,14 @@ def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
     thick, printed = high - low, layers.printed_mm(high) - layers.printed_mm(low)
     named = ", ".join(f"{z:g}" for z in off[:3]) + (" ..." if len(off) > 3 else "")
     effect = f"; it prints {printed:g} mm thick instead of {thick:g}" if abs(printed - thick) > TOUCH_MM else ""
+    if any(abs(z - mid) < TOUCH_MM for z in off for mid in layers.mids_mm):
+        effect += "; at mid-height of a layer: the estimate assumes that the body below takes it, which is not certain"
     yield Finding(
-        "3-grid", "warning", body.name,
-        f"faces at {named} mm lie between layer boundaries{effect}{_uncertain(off, layers)}",
+        "3-grid", "warning", body.name, f"faces at {named} mm lie between layer boundaries{effect}",
         f"move them to {', '.join(dict.fromkeys(f'{layers.printed_mm(z):g}' for z in off[:3]))} mm",
         round(off[0], 9), round(layers.printed_mm(off[0]), 9),
         place_mm=_place(body, off[0]), count=len(off),
     )  # fmt: skip
-
-
-def _uncertain(faces_mm: Sequence[float], layers: Layers) -> str:
-    """End of a message where a face lies at mid-height of a layer."""
-    if any(abs(z - mid) < TOUCH_MM for z in faces_mm for mid in layers.mids_mm):
-        return "; at mid-height of a layer: the estimate assumes that the body below takes it, which is not certain"
-    return ""
 
 
 def _samples(body: Body, layers: Layers) -> Iterator[Finding]:

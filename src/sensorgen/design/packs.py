@@ -271,7 +271,11 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> File:
     here = beside(folder or Path())
     pack = shipped_names(kind).get(name)
     if pack:
-        _refuse_hiding(here, File(kind, name, pack))
+        if here.path(kind, name).is_file() and here.place(kind).resolve() != pack.place(kind).resolve():
+            raise BadInput(
+                f"{here.path(kind, name)}: a {SINGULAR[kind]} {name!r} ships with sensorgen (pack {pack.name}); "
+                "rename the file"
+            )
         return File(kind, name, pack)
     if is_name(kind, name) and (packs := _having(kind, name, here)):
         if len(packs) > 1:
@@ -281,16 +285,6 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> File:
         return File(kind, name, packs[0])
     built_in = ["array"] if kind == "shapes" else []  # crossing tracks: the one shape that is no file
     raise unknown(kind, name, (*(file.name for file in files(kind, folder)), *built_in))
-
-
-def _refuse_hiding(here: Pack, shipped: File) -> None:
-    """Refuse a file beside a design that has the name of one that ships."""
-    kind, name, pack = shipped.kind, shipped.name, shipped.pack
-    if here.path(kind, name).is_file() and here.place(kind).resolve() != pack.place(kind).resolve():
-        raise BadInput(
-            f"{here.path(kind, name)}: a {SINGULAR[kind]} {name!r} ships with sensorgen (pack {pack.name}); "
-            "rename the file"
-        )
 
 
 def _having(kind: Kind, name: str, here: Pack) -> list[Pack]:

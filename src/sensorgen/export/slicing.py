@@ -15,7 +15,7 @@ from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
 from sensorgen.design.printer import tower
 from sensorgen.export import threemf
-from sensorgen.export.gcode.drags import Lifted, lift
+from sensorgen.export.gcode.crossings import Lifted, lift
 from sensorgen.export.gcode.motion import Paths, follow, paths_of
 from sensorgen.export.gcode.reading import text_of
 from sensorgen.export.gcode.ready import ready

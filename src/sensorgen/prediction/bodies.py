@@ -13,8 +13,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.files import reading
 from sensorgen.design.body import DRAWN, Body, Cells, FilmThickness
 from sensorgen.design.design import Design, make
-from sensorgen.design.walls import WALLS
-from sensorgen.design.walls import rules as wall_rules
+from sensorgen.design.profile import WALLS, wall_rules
 from sensorgen.scene.scene import Prism
 
 if TYPE_CHECKING:
@@ -186,7 +185,7 @@ def from_gcode(design: Design, file: str | Path) -> Body:
     Raises
     ------
     BadInput
-        No such file; when the cells are needed, as :func:`sensorgen.asprinted.registration.placed`.
+        No such file; when the cells are needed, as :func:`sensorgen.asprinted.beads.placed`.
     """
     path = Path(file)
     with reading(path):
@@ -196,10 +195,10 @@ def from_gcode(design: Design, file: str | Path) -> Body:
 
 def registered(design: Design, path: Path) -> "Printed":
     """Print of a design by a file of G-code; parameters and errors as of :func:`from_gcode`."""
-    from sensorgen.asprinted import printed, registration
+    from sensorgen.asprinted import beads, printed
 
     try:
-        placement = registration.placed(design, path)
+        placement = beads.placed(design, path)
         return printed.body(design, placement.paths, slicer=path.name, centre_mm=placement.centre_mm)
     except BadInput as error:
         raise error.within(str(path)) from None

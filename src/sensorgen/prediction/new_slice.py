@@ -21,7 +21,7 @@ from sensorgen.export.slicers import TIME_LIMIT_S, TITLES
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
-    from sensorgen.export.gcode.drags import Lifted
+    from sensorgen.export.gcode.crossings import Lifted
 
 GCODE = "13-gcode"  # rule of what the check of a G-code file reports
 

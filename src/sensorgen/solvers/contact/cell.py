@@ -9,9 +9,9 @@ from typing import TypeVar
 import shapely
 
 from sensorgen.core.errors import BadInput
+from sensorgen.scene.repetition import Slice, cut, repeats, slices, straightened
 from sensorgen.scene.scene import Point, Scene
 from sensorgen.scene.sections import sections
-from sensorgen.scene.unit_cell import Slice, cut, repeats, slices, straightened
 
 OUTSIDE = 0  # the region beyond the cell
 AIR = "air"

@@ -148,15 +148,12 @@ def _lines(
     for far in distances.tolist():
         near = [beyond(_simpler(region, far / 5), (x, y), cell.periodic, np.ceil(2 * far)) for region in metal]
         lines.append(shapely.difference(shapely.clip_by_rect(_beside(near, far), 0.0, 0.0, x, y), sides))
-    return lines + _cuts(cell, pitch_mm, size)
-
-
-def _cuts(cell: LayerCell, pitch_mm: Real, size: tuple[float, float]) -> list[Any]:
-    """Lines across a cell where outlines are cut, in pitches of the grid."""
-    x, y = size
-    across, along = (np.rint(np.array(cell.cuts_mm[axis]) / pitch_mm[axis]).tolist() for axis in (0, 1))
-    lines = [((at, 0.0), (at, y)) for at in across] + [((0.0, at), (x, at)) for at in along]
-    return list(map(shapely.LineString, lines))
+    for axis, places in enumerate(cell.cuts_mm):
+        lines += [
+            shapely.LineString(((at, 0.0), (at, y)) if axis == 0 else ((0.0, at), (x, at)))
+            for at in np.rint(np.array(places) / pitch_mm[axis]).tolist()
+        ]
+    return lines
 
 
 def _beside(regions: Sequence[Any], far: float) -> Any:

@@ -23,15 +23,7 @@ from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Piece, Prism
 from sensorgen.solvers.electrostatics.bounds import Energies, Unsolved
 from sensorgen.solvers.electrostatics.prisms import TOP, balanced, fluxes
-from sensorgen.solvers.electrostatics.round_cell import (
-    SAME_MM,
-    DomeTouch,
-    ProfileEdge,
-    RoundCell,
-    Sized,
-    profile,
-    touches,
-)
+from sensorgen.solvers.electrostatics.round_cell import SAME_MM, DomeTouch, ProfileEdge, RoundCell, profile, touches
 
 ROUND = "round"  # end of the name of faces that elements approach by polynomials
 SIDE, BETWEEN = "side", "between"  # names of mirrors, and of faces between dielectrics
@@ -94,20 +86,28 @@ def mesh_of(cell: RoundCell, order: int, layers: int, closed: float) -> RoundMes
         most 300 000 unknowns fills it.
     """
     try:
+        import netgen.occ as occ
         import ngsolve as ng
-        from netgen.meshing import NgException
+        from netgen.meshing import MeshingParameters, NgException
     except ImportError:
         raise NotInstalled("curved bodies need NGSolve: pip install 'sensorgen[fem]'") from None
     cusps = [(touch, closed * touch.apart_mm) for touch in touches(cell)]
-    geometry, grading = _geometry(cell, cusps)
+    try:
+        shape, grading = _shape(cell, cusps)
+        geometry = occ.OCCGeometry(shape)
+    except occ.OCCException as error:
+        raise Unsolved(f"the CAD kernel does not cut this cell: {error}") from None
     longest = _COARSE * min(np.subtract(cell.high_mm, cell.low_mm)[:2])
     sizes = cell.sizes(np.array(grading.along).reshape(-1, 3), _NEAR, longest)
-    for touch, gap in cusps:
-        sizes += touch.sizes(cell, gap, _CUSP)
+    sizes += [size for touch, gap in cusps for size in touch.sizes(cell, gap, _CUSP)]
     growth = 0.5
     for _ in range(_TRIES):
+        # Threads that wait for each other would take ten times the processor time
+        wanted = MeshingParameters(maxh=longest, grading=growth, parallel_meshing=False, nthreads=1)
+        for size in sizes:
+            wanted.RestrictH(*size)
         try:
-            coarse = geometry.GenerateMesh(_wanted(sizes, longest, growth))
+            coarse = geometry.GenerateMesh(wanted)
         except NgException:
             longest, growth = _FINER * longest, _SLOWER * growth
             continue
@@ -122,37 +122,10 @@ def mesh_of(cell: RoundCell, order: int, layers: int, closed: float) -> RoundMes
         bad = unsound(mesh, order)
         if not bad.any():
             return RoundMesh(cell, mesh, [touch for touch, _ in cusps], rounds)
-        sizes += _halved(middles, spans, _middles(mesh)[bad])
+        for place in _middles(mesh)[bad]:
+            k = int(((middles - place) ** 2).sum(1).argmin())
+            sizes.append((*middles[k].tolist(), float(spans[k]) / 2))
     raise Unsolved("no sound mesh of this cell: faces meet at too small an angle, or are too near each other")
-
-
-def _halved(middles: Real, spans: Real, places: Real) -> Iterator[Sized]:
-    """Sizes that halve the elements of which the middles (n, 3) are nearest to some places."""
-    for place in places:
-        k = int(((middles - place) ** 2).sum(1).argmin())
-        yield (*middles[k].tolist(), float(spans[k]) / 2)
-
-
-def _geometry(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> tuple[Any, "_Grading"]:
-    """Geometry of a cell for the mesher, its edges and tips to be graded marked."""
-    import netgen.occ as occ
-
-    try:
-        shape, grading = _shape(cell, cusps)
-        return occ.OCCGeometry(shape), grading
-    except occ.OCCException as error:
-        raise Unsolved(f"the CAD kernel does not cut this cell: {error}") from None
-
-
-def _wanted(sizes: Sequence[Sized], longest: float, growth: float) -> Any:
-    """Parameters of the mesher: longest edges at some places and everywhere, and their growth."""
-    from netgen.meshing import MeshingParameters
-
-    # Threads that wait for each other would take ten times the processor time
-    wanted = MeshingParameters(maxh=longest, grading=growth, parallel_meshing=False, nthreads=1)
-    for size in sizes:
-        wanted.RestrictH(*size)
-    return wanted
 
 
 def unsound(mesh: Any, order: int) -> Mask:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Whole
+from sensorgen.scene.repetition import Band, SectionCell, Slice, cell
 from sensorgen.scene.sections import ROUNDING_MM, Section, distinct
-from sensorgen.scene.unit_cell import Band, SectionCell, Slice, cell
 
 Edge = tuple[int, int]
 Triangle = tuple[int, int, int]

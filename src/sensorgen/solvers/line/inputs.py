@@ -245,16 +245,11 @@ def in_range(name: str, given: ArrayLike) -> Real:
     low, high = _lowest(value), _highest(value)
     if low > high or (least <= low and high < math.inf and low > -math.inf and not (low == 0 and name in ABOVE_0)):
         return value  # there is none, or NaN, which passes through min and max, would fail each comparison
-    raise _outside(name, value, least)
-
-
-def _outside(name: str, value: Real, least: float) -> OutOfRange:
-    """Error for a quantity of which a number is not finite, or too low."""
     want = "above 0" if name in ABOVE_0 else "a number" if name in FREE else "0 or more"
     bad = np.asarray(~((value > least) & (value < math.inf)))
     if name not in FREE | ABOVE_0:
         bad &= value != 0
-    return OutOfRange(f"{name} has to be {want} and finite, not {np.asarray(value)[bad].flat[0]:g}")
+    raise OutOfRange(f"{name} has to be {want} and finite, not {np.asarray(value)[bad].flat[0]:g}")
 
 
 def _lowest(value: Real) -> float:
