@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -22,9 +21,6 @@ from sensorgen.export.gcode.moves import Motion
 from sensorgen.export.gcode.reading import Source
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, parts
 from sensorgen.scene.scene import SLIVER_MM, Point
-
-if TYPE_CHECKING:
-    from sensorgen.export.gcode.motion import Paths
 
 CONVENTIONS = ("vol", "deposit", "stadium")
 FULL = 0.95  # a plate of which this share is filled has no holes but between rounded lines

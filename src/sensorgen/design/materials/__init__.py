@@ -5,15 +5,19 @@ optionally, the source to take: ``x60`` or ``x60@thesis-4.1``. Sources of the us
 files of packs too; a design that names none of them never sees them, so that its identity is the same for every reader.
 """
 
+import json
+import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from functools import cache, lru_cache
 from importlib import resources
 from math import exp, inf, isinf
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field, model_validator
 
+from sensorgen.core import files as store
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.records import Line, Strict, checked, stated
@@ -281,13 +285,53 @@ def own_source(source: str, text: str | None = None, texts: Texts = NO_TEXTS) ->
 
 def _own(source: str, text: str | None) -> Own:
     """A source of the user's own, its values not checked yet."""
-    from sensorgen.design.materials import own
-
-    file = f"{source}.yaml" if text is not None else str(own.path(source))
+    file = f"{source}.yaml" if text is not None else str(source_path(source))
     try:
-        return checked(Own, yamlfile.parse(own.text(source) if text is None else text, file))
+        return checked(Own, yamlfile.parse(_source_text(source) if text is None else text, file))
     except BadInput as error:
         raise error.within(file) from None
+
+
+class SourceValue(NamedTuple):
+    """Value of a quantity with its interval, in the unit of the quantity's name."""
+
+    quantity: str
+    value: float
+    low: float
+    high: float
+    note: str = ""
+
+    def row(self) -> str:
+        """Line of a source's file."""
+        numbers = f"value: {self.value:.6g}, low: {self.low:.6g}, high: {self.high:.6g}"
+        return f"    {self.quantity}: {{{numbers}{f', note: {json.dumps(self.note)}' if self.note else ''}}}"
+
+
+def source_file(about: str, materials: Mapping[str, Iterable[SourceValue]], comments: Iterable[str] = ()) -> str:
+    """File of a source of the user's own: values of materials, and comments on what it has not."""
+    lines = [f"about: {json.dumps(about)}", "materials:"]
+    for material, values in materials.items():
+        rows = [value.row() for value in values]
+        lines += [f"  {material}:{'' if rows else ' {}'}", *rows]
+    return "\n".join((*lines, *(f"# {comment}" for comment in comments))) + "\n"
+
+
+def source_folder() -> Path:
+    """The folder of fits: what SENSORGEN_MATERIALS says, or the system's place for a user's data."""
+    return store.data(packs.SOURCES, "materials")
+
+
+def source_path(source: str) -> Path:
+    """The file of a source of the user's own: of the pack that has it, else where a fit is to write it."""
+    packed = (pack.path("sources", source) for pack in packs.own())
+    return next((file for file in packed if os.path.lexists(file)), source_folder() / f"{source}.yaml")
+
+
+def _source_text(source: str) -> str:
+    """Content of a source's file; raises BadInput where it cannot be read."""
+    file = source_path(source)
+    pack = next(pack for pack in packs.own() if pack.path("sources", source) == file)
+    return packs.File("sources", source, pack).text()
 
 
 def _check_values(name: str, values: Mapping[str, float], texts: Texts) -> None:
