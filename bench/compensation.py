@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 from sensorgen.asprinted.printed import body
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import make
-from sensorgen.design.profile import wall_rule
+from sensorgen.design.walls import rule
 from sensorgen.export import slicing
 from sensorgen.prediction import bodies
 from sensorgen.workflows.compensation import CAPACITANCE, GAP, compensated, of_body
@@ -83,7 +83,7 @@ def row(shape: str, film: float, quality: str, slicer: str) -> str:
     head = f"| {shape} {film:g} {quality} | {slicer} | {asked[GAP]:g} mm, {asked[CAPACITANCE]:.4g} pF | "
     head += f"{before[GAP]:g} mm, {larger * before[CAPACITANCE] / asked[CAPACITANCE] - 1:+.1%} | "
     try:
-        made, changes = compensated(design, wall_rule(slicer, design.walls), sliced=sliced)
+        made, changes = compensated(design, rule(slicer, design.walls), sliced=sliced)
     except SensorgenError as error:
         return head + f"refused | | {error} | {count[0]}, {seconds() - start:.1f} |"
     effort = f"{count[0]}, {seconds() - start:.1f}"

@@ -13,7 +13,7 @@ from pathlib import Path
 from sensorgen.asprinted.printed import body
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design import design
-from sensorgen.design.profile import wall_rule as rule_of
+from sensorgen.design.walls import rule as rule_of
 from sensorgen.export.slicing import alone, sliced
 from sensorgen.prediction import bodies
 from sensorgen.prediction.rest_state import rest_state

@@ -14,7 +14,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from sensorgen.design.design import make
-from sensorgen.design.effects import Tip
+from sensorgen.design.tip import Tip
 from sensorgen.models import press2d
 from sensorgen.prediction.bodies import estimated
 from sensorgen.prediction.compression_law import case_of

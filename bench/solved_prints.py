@@ -19,7 +19,7 @@ import numpy as np
 from sensorgen.core import yamlfile
 from sensorgen.core.arrays import Real
 from sensorgen.design.design import Design, make
-from sensorgen.design.effects import EVEN, STIFF, Tip
+from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.prediction.bodies import WALLS, estimated, of_file
 from sensorgen.prediction.compression_law import case_of, content, solved
 from sensorgen.prediction.mesh_ladder import (

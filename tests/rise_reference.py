@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from sensorgen.design.design import make
-from sensorgen.design.effects import Tip
+from sensorgen.design.tip import Tip
 from sensorgen.prediction.compression_law import STRESS_PA, case_of
 from sensorgen.prediction.mesh_ladder import PressedPiece, drawn, estimated, model_of
 from sensorgen.scene.scene import Body, Prism, Scene

@@ -8,7 +8,7 @@ from drawn_sensor import sensor_of
 
 from sensorgen.design import materials
 from sensorgen.design.design import make
-from sensorgen.design.effects import EVEN, STIFF
+from sensorgen.design.tip import EVEN, STIFF
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.identifiability import identify as changes

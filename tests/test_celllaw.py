@@ -11,7 +11,7 @@ import pytest
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import make
-from sensorgen.design.effects import Tip
+from sensorgen.design.tip import Tip
 from sensorgen.models import compression
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.capacitance import Answer

@@ -11,7 +11,7 @@ import pytest
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
-from sensorgen.design.effects import EVEN
+from sensorgen.design.tip import EVEN
 from sensorgen.prediction import compression_law as celllaw
 from sensorgen.prediction import rest_state, sensor_model
 from sensorgen.prediction.bodies import drawn, estimated

@@ -8,7 +8,7 @@ import pytest
 from sensorgen.checks import estimate
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.design import design
-from sensorgen.design.profile import wall_rule, wall_rules
+from sensorgen.design.walls import rule, rules
 from sensorgen.export.slicers import cura, orca, prusa
 from sensorgen.export.slicers import cura as curaengine
 from sensorgen.export.slicers.loads import loads, overlaid
@@ -147,9 +147,9 @@ def test_one_plate_has_one_profile():
 
 
 def test_estimates_use_the_designs_walls():
-    assert wall_rules(None)[0] == "arachne"
-    assert wall_rules("classic") == ("classic", "cura", "cura-5")
-    assert wall_rule("cura", "arachne") == "cura-gaps"
+    assert rules(None)[0] == "arachne"
+    assert rules("classic") == ("classic", "cura", "cura-5")
+    assert rule("cura", "arachne") == "cura-gaps"
     layers = estimate.layers(PLAIN.printed, PLAIN.machine, PLAIN.layers, "classic")
     assert layers
     made = {walls: estimated(make(walls=walls)) for walls in ("arachne", "classic")}

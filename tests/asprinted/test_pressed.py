@@ -7,8 +7,8 @@ import pytest
 
 from sensorgen.asprinted.printed import body
 from sensorgen.core.errors import SensorgenError
-from sensorgen.design.effects import Tip
-from sensorgen.design.profile import WALLS
+from sensorgen.design.tip import Tip
+from sensorgen.design.walls import WALLS
 from sensorgen.models import press2d, press3d
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.prediction import compression as compressed

@@ -20,7 +20,7 @@ from sensorgen.checks.volumes import LayerVolume
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
-from sensorgen.design.profile import WALLS
+from sensorgen.design.walls import WALLS
 from sensorgen.scene.geometry import meshes
 from sensorgen.scene.layers import LayerRegions, drawn, scene_of
 from sensorgen.scene.scene import FLOATING, Body, Point, Scene, seen_from_above

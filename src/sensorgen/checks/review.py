@@ -10,7 +10,7 @@ from sensorgen.core.document import Part, Table, comma_separated
 from sensorgen.core.findings import Finding, Verdict, counted, counts, headline, listed, table, verdict
 from sensorgen.design.design import Design
 from sensorgen.design.printer import tower
-from sensorgen.design.profile import wall_rule
+from sensorgen.design.walls import rule
 from sensorgen.scene.geometry import meshes
 from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import Scene
@@ -91,7 +91,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
     step("checks")
     gap_mm = meshes.electrode_gap_mm(scene, meshed)
     findings = rules.findings(
-        scene, design.machine, design.layers, gap_mm, walls or wall_rule("prusa", design.walls), estimate.lines(design)
+        scene, design.machine, design.layers, gap_mm, walls or rule("prusa", design.walls), estimate.lines(design)
     ) + _crowding(design)
     findings = [advised(f, [p.name for p in fields(design.params)]) for f in findings]
     if not any(f.severity == "error" and f.rule != LOST for f in findings):

@@ -32,7 +32,7 @@ from sensorgen.core import units
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.options import Option
 from sensorgen.design import shapes
-from sensorgen.design.profile import WALLS
+from sensorgen.design.walls import WALLS
 from sensorgen.export.slicers import SLICERS
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from sensorgen.cli.designs import Compensate, compensated, of_design
 from sensorgen.cli.options import Advising, Cluster, DesignTip, Jobs, LogFile, NoCache, Out, Strict, TimeLimit
 from sensorgen.core.errors import Unprintable
 from sensorgen.core.options import Option
-from sensorgen.design.profile import wall_rule
+from sensorgen.design.walls import rule
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ def slice_command(
     from sensorgen.export.slicing import STEPS
     from sensorgen.workflows.slice import slice_design
 
-    walls = wall_rule(slicer, design.walls)
+    walls = rule(slicer, design.walls)
     design, changes = compensated(design, compensate, walls, slicer, program)
     with render.refused(design.name), render.progress(("checks", *STEPS)) as step:
         gcode = slice_design(

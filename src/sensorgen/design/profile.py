@@ -1,7 +1,4 @@
-"""Settings of a slicer where a design wants it otherwise than our profiles, down to settings of the user's own.
-
-And the walls by whose rules a print is estimated: their names, and what provenance calls them.
-"""
+"""Settings of a slicer where a design wants it otherwise than our profiles, down to settings of the user's own."""
 
 import json
 import re
@@ -106,27 +103,3 @@ def _of_json(path: Path, text: str) -> dict[str, Setting]:
     if not isinstance(data, dict) or any(isinstance(v, bool | list | dict | None) for v in data.values()):
         raise BadInput(f"{path}: expected names of settings, each with one text or number")
     return data
-
-
-_RULES = {"prusa": {"arachne": "arachne", "classic": "classic"}, "cura": {"arachne": "cura-gaps", "classic": "cura"}}
-
-WALLS = {
-    "arachne": "PrusaSlicer, Arachne walls",  # the default of ours
-    "classic": "PrusaSlicer, classic walls",
-    "cura": "plain Cura",
-    "cura-gaps": "Cura filling outline gaps",
-    "cura-5": "Cura 5",
-}
-
-
-def wall_rule(slicer: str, walls: str) -> str:
-    """Choice among ``WALLS`` that a slicer makes of a design's walls (arachne or classic)."""
-    return _RULES[slicer][walls]
-
-
-def wall_rules(walls: str | None) -> tuple[str, ...]:
-    """Those of ``WALLS`` that a design's walls can come out as, the likeliest first; all where it names none.
-
-    Cura 5 prints every design by its own.
-    """
-    return (*(of[walls] for of in _RULES.values()), "cura-5") if walls else tuple(WALLS)

@@ -13,7 +13,8 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.files import reading
 from sensorgen.design.body import DRAWN, Body, Cells, FilmThickness
 from sensorgen.design.design import Design, make
-from sensorgen.design.profile import WALLS, wall_rules
+from sensorgen.design.walls import WALLS
+from sensorgen.design.walls import rules as wall_rules
 from sensorgen.scene.scene import Prism
 
 if TYPE_CHECKING:

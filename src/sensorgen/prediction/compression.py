@@ -17,7 +17,7 @@ from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput, MissingValue, NotInstalled, OutOfRange, SensorgenError
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
-from sensorgen.design.effects import TOPS, WORDS, Tip
+from sensorgen.design.tip import TOPS, WORDS, Tip
 from sensorgen.design.values import assumed, film, of_all_materials, permittivities
 from sensorgen.models import press2d, springs
 from sensorgen.models.compression import curve_of

@@ -19,7 +19,7 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.design.effects import EVEN, STIFF, Tip
+from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.design.values import MaterialValue, film, material_value, of_all_materials, permittivities
 from sensorgen.models import compression
 from sensorgen.models.compression import CapacitanceCurve, Compression, curve_of, extended

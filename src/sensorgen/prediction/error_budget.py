@@ -22,10 +22,11 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.design.effects import EVEN, GUESS, TOPS, Effects
+from sensorgen.design.effects import GUESS, Effects
 from sensorgen.design.materials import PIEZORESISTANCE
-from sensorgen.design.profile import wall_rule, wall_rules
+from sensorgen.design.tip import EVEN, TOPS
 from sensorgen.design.values import ENDS, MaterialValue, material_value, piezoresistance, resistivities, spread
+from sensorgen.design.walls import rule, rules
 from sensorgen.models import pressure
 from sensorgen.models.compression import averaged, beyond
 from sensorgen.models.pressure import PROFILES
@@ -428,7 +429,7 @@ CHANGE, PRINT = "CHANGE", "PRINT"
 
 def by_walls(design: Design) -> str:
     """Verdict with the walls of other slicers: CHANGE where they lose a body, PRINT where these alone do; else ""."""
-    own, others = wall_rule("prusa", design.walls), wall_rules(design.profile.walls)
+    own, others = rule("prusa", design.walls), rules(design.profile.walls)
     lost = {walls: _loses(design, walls) for walls in dict.fromkeys((own, *others))}
     if not lost[own]:
         return CHANGE if any(lost.values()) else ""

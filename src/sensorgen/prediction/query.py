@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.core.options import Option
 from sensorgen.core.units import FREQUENCY_HZ, M_PER_MM
-from sensorgen.design.effects import TIP_M, Tip
+from sensorgen.design.tip import TIP_M, Tip
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design

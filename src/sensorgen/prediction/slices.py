@@ -10,8 +10,8 @@ from sensorgen.checks.review import LOST, Review, Step, advised, review
 from sensorgen.core.errors import MissingValue
 from sensorgen.core.findings import Finding, grouped
 from sensorgen.design.design import Design
-from sensorgen.design.profile import WALLS, wall_rule
 from sensorgen.design.values import permittivities, resistivities
+from sensorgen.design.walls import WALLS, rule
 from sensorgen.export.slicers import SLICERS
 from sensorgen.prediction.new_slice import GCODE
 from sensorgen.prediction.print_files import NONE, PrintFile, at_hand
@@ -37,7 +37,7 @@ class PrintReview(Review):
 
     def printed(self, design: Design, walls: str = "") -> asprinted.Printed:
         """The print that the findings are about."""
-        walls = walls or wall_rule("prusa", design.walls)
+        walls = walls or rule("prusa", design.walls)
         return self.file.printed(design) if self.file else asprinted.body(design, walls=walls)
 
     def errors(self, strict: bool = False) -> list[Finding]:
@@ -62,7 +62,7 @@ def reviewed(
     walls : str
         For an estimate, one of ``WALLS``; the design's if not given.
     """
-    drawn = review(design, step, walls or (wall_rule(slicer, design.walls) if slicer in SLICERS else ""))
+    drawn = review(design, step, walls or (rule(slicer, design.walls) if slicer in SLICERS else ""))
     step("slicing")
     file, why = at_hand(design, folder, NONE if walls else slicer, step)
     if file:
@@ -72,7 +72,7 @@ def reviewed(
 
 def estimated(design: Design, drawn: Review, walls: str = "", why: str = "") -> PrintReview:
     """Findings about a drawing and about its print by the rules of slicers."""
-    walls, shorts = walls or wall_rule("prusa", design.walls), list[Finding]()
+    walls, shorts = walls or rule("prusa", design.walls), list[Finding]()
     if drawn.meshes and all(f.rule != SHORT for f in drawn.findings):
         shorts = [f for f in asprinted.body(design, walls=walls).findings() if f.rule == SHORT]
     return combined(design, drawn, f"estimated ({WALLS[walls]}){why and f': {why}'}", shorts)

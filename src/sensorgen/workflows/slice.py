@@ -13,7 +13,7 @@ from sensorgen.core.document import Part
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.findings import Finding, Verdict, headline, listed
 from sensorgen.design.design import Design
-from sensorgen.design.profile import wall_rule
+from sensorgen.design.walls import rule
 from sensorgen.export.gcode.results import FileNeeds
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step
@@ -105,7 +105,7 @@ def slice_design(
         The place cannot be written to, or the disk is full.
     """
     step("checks")
-    drawn = review(design, walls=wall_rule(slicer, design.walls) if slicer in SLICERS else "")
+    drawn = review(design, walls=rule(slicer, design.walls) if slicer in SLICERS else "")
     if (drawn.errors(strict) or of_own_machine(design)) and not force:
         whole = _reviewed(design, slicer, program)
         raise Unprintable(whole.findings, whole.errors(strict), whole.source)

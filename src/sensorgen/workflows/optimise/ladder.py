@@ -15,8 +15,8 @@ from sensorgen.core.records import adapter
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
-from sensorgen.design.effects import TOPS
-from sensorgen.design.profile import wall_rules
+from sensorgen.design.tip import TOPS
+from sensorgen.design.walls import rules as wall_rules
 from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import at_a_few_pressures
 from sensorgen.prediction.identifiability.fisher import bounds, slopes

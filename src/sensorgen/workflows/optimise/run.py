@@ -17,8 +17,8 @@ from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import SensorgenError, Unprintable, within
 from sensorgen.core.parallel import in_parallel
 from sensorgen.design.design import Design, make
-from sensorgen.design.effects import EVEN, TOPS
-from sensorgen.design.profile import wall_rules
+from sensorgen.design.tip import EVEN, TOPS
+from sensorgen.design.walls import rules
 from sensorgen.prediction.mesh_ladder import ROUGH
 from sensorgen.workflows.build import build
 from sensorgen.workflows.moves import Candidate, EarlyNumber
@@ -189,8 +189,8 @@ def _robust(
     inputs, owners = list[tuple[Any, ...]](), list[int]()
     for row in rows:
         top = max(TOPS, key=partial(_under, target, row.design, pressed[0])) if pressed else EVEN
-        designs = [(row.design, ""), *((row.design, rule) for rule in wall_rules(None))]
-        designs += [(design, wall_rules(None)[0]) for design in within_tolerance(target, row.design)]
+        designs = [(row.design, ""), *((row.design, rule) for rule in rules(None))]
+        designs += [(design, rules(None)[0]) for design in within_tolerance(target, row.design)]
         inputs += [(design, query, bool(pressed), rule, (top,), ROUGH) for design, rule in designs]
         owners += [row.number] * len(designs)
     numbers: dict[int, list[dict[str, EarlyNumber]]] = {row.number: [] for row in rows}

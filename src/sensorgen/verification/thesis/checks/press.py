@@ -7,7 +7,7 @@ import numpy as np
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
-from sensorgen.design.effects import EVEN, Tip
+from sensorgen.design.tip import EVEN, Tip
 from sensorgen.measure.signal import lowpass
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import compression as compressed
