@@ -2,7 +2,7 @@
 
 Run as ``python bench/coverage.py [SPECIMENS [FEWER]]``; writes results/coverage.md. ``FEWER`` specimens make the rows
 of a single error, in which they differ by their noise alone. Each specimen (tests/virtual_specimen, which
-shares no line with the package) is pressed 30 times for its calibration and 200 times for the inversion. A twentieth
+shares no line with the package) is pressed 30 times for its calibration and 200 times for the inversion. A fifth
 of ``SPECIMENS`` of another simulator (tests/independent_sensor.py) change after their calibration.
 
 Each coverage has the binomial interval of 95 % (Wilson) of as many presses as are independent: those of a specimen
@@ -208,7 +208,7 @@ def main():
     specimens = int(sys.argv[1]) if len(sys.argv) > 1 else 200
     fewer = int(sys.argv[2]) if len(sys.argv) > 2 else specimens
     warnings.simplefilter("ignore")
-    changed = changes_text(max(specimens // 20, 3))
+    changed = changes_text(max(specimens // 5, 3))
     model, lines, seconds = specimen_model(), [], []
     cases = [(name, of_the_simulator(truth_of), KNOWN) for name, truth_of in ERRORS.items()]
     cases += [("all at once", of_the_simulator(ERRORS["all at once"]), known) for known in (0, 10, 100)]

@@ -163,6 +163,8 @@ def test_beside_a_short_the_loose_part_of_a_broken_row_mixes_crossings_that_are_
     lost[1, 3:] = lost[3, 3:] = True
     assert (np.isnan(mixed.pressure_kpa) == lost).all()
     assert np.nanmax(np.abs(mixed.pressure_kpa - PRESSURE / 1e3)) < 1
+    assert mixed.faults == ("r4c5", "r2:3")
+    assert "faults at rest" in "".join(document.text(mixed.document()))
 
 
 def test_force_and_centre_count_lost_crossings_by_those_around(model):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.models import refusal
 from sensorgen.scene.repetition import cell
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import Section, sections
@@ -38,13 +39,7 @@ _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
 
 def why_not_applicable(scene: Scene) -> str | None:
     """Why the model does not apply to a scene, or None."""
-    if reason := fem.unmirrored(scene):
-        return reason
-    try:
-        _triangles(scene)
-    except ValueError as error:
-        return str(error)
-    return None
+    return fem.unmirrored(scene) or refusal(ValueError, _triangles, scene)
 
 
 def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:

@@ -61,6 +61,8 @@ class PressureMaps:
         not determined [kPa].
     calibration : ArrayCalibration or None
         That gave the pressures; its errors are in the standard errors.
+    faults : tuple of str
+        Breaks and shorts that the readings at rest show, as in :func:`faulty`.
     """
 
     model: ArrayModel
@@ -69,6 +71,7 @@ class PressureMaps:
     pressure_kpa: Real
     sigma_kpa: Real
     calibration: "ArrayCalibration | None" = None
+    faults: tuple[str, ...] = ()
 
     def on_surface(self) -> "PressureMaps":
         """Maps of the pressure on the cover, its spread undone; what is not determined is as what lies around it.
@@ -215,6 +218,8 @@ class PressureMaps:
             ("frames", f"{len(self.time_s)}, inverted by {self.by}"),
             ("pressures", errors),
             *((("not determined", f"{dark} of {count} crossings: {self._names(k)}"),) if dark else ()),
+            *((("faults at rest", f"{', '.join(self.faults)} (r3:5: row 3 broken behind column 5; r2c4: a short)"),)
+              if self.faults else ()),
         ))  # fmt: skip
         yield ""
         shown = tuple(float(f"{v:.4g}") if isinstance(v, float) else v for v in table.cells[k])
@@ -353,6 +358,21 @@ class MapInverter:
             ohm = 1 / leaks[shorted] + 1 / self.rest_s.real[shorted] - 1 / read
             leaks[shorted] = 1 / np.maximum(ohm, 1e-3 / leaks[shorted])
         return leaks
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Breaks and shorts that the readings at rest show, as in :func:`faulty`."""
+        whole, read = self.model.tracks(), self._tracks
+        words = [f"r{i + 1}c{j + 1}" for i, j in np.argwhere(self.leaks_s > 0).tolist()]
+        for letter, side in (("r", "row"), ("c", "column")):
+            stretches, leads = (
+                np.isinf(getattr(read, f"{side}_{part}")) & np.isfinite(getattr(whole, f"{side}_{part}"))
+                for part in ("ohm", "lead_ohm")
+            )
+            stretches = stretches if side == "row" else stretches.T
+            words += [f"{letter}{track + 1}:{after + 1}" for track, after in np.argwhere(stretches).tolist()]
+            words += [f"{letter}{track + 1}:0" for track in np.flatnonzero(leads).tolist()]
+        return tuple(words)
 
     @cached_property
     def parts(self) -> tuple[Mask, Mask]:
@@ -538,7 +558,7 @@ class MapInverter:
             mean, half = calibration.of_ratio(ratio, time_s, calibration.counted(day), past)
             pressure, sigma = PA_PER_KPA * mean, PA_PER_KPA / NORMAL_90 * half
         shown, error_kpa = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
-        return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration)
+        return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration, self.faults)
 
 
 @dataclass(frozen=True, eq=False)
