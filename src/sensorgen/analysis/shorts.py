@@ -18,9 +18,8 @@ import numpy as np
 import shapely
 
 from sensorgen.analysis.plots.figure import ORANGE, Axis, Curve, Figure, Map, Panel
-from sensorgen.asprinted.beads import beads
+from sensorgen.asprinted.beads import beads, placed
 from sensorgen.asprinted.pinholes import CoveredFilm, Pinholes, draws, films, opened, pinholes, through
-from sensorgen.asprinted.registration import placed
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput

@@ -213,27 +213,28 @@ def _decoded(data: object) -> Scene:
 
 def _fields(name: str, reply: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
     """Parameters as a shape's file describes them, checked."""
-    parameters: list[tuple[str, type, Any]] = []
     inherited = {f.name for f in dataclasses.fields(Envelope)}
     if missing := inherited - {str(field.get("name")) for field in reply["fields"]}:
         raise BadInput(f"{name}.py: Params has no {sorted(missing)[0]}; expected a dataclass derived from Envelope")
-    for field in reply["fields"]:
-        key, default, about = str(field["name"]), field["default"], dict(field["metadata"])
-        about["help"] = harmless(about["help"]) if isinstance(about.get("help"), str) else ""
-        where = f"{name}.py: parameter {key[:60]}"
-        if not _NAME.fullmatch(key):
-            raise BadInput(f"{where}: expected a name of small letters, digits and '_'")
-        if not about["help"]:
-            raise BadInput(f"{where} has no help; write metadata={{'help': ..., 'range': (low, high)}}")
-        choices = about.get("choices")
-        if choices:
-            if default not in choices or not all(isinstance(each, str) and each.isprintable() for each in choices):
-                raise BadInput(f"{where}: default {default!r:.40} is not among its choices, or one cannot be printed")
-            about["choices"] = tuple(choices)
-        else:
-            default, about["range"] = _in_range(where, default, about)
-        parameters.append((key, str if choices else float, dataclasses.field(default=default, metadata=about)))
-    return parameters
+    return [_parameter(name, field) for field in reply["fields"]]
+
+
+def _parameter(name: str, field: Mapping[str, Any]) -> tuple[str, type, Any]:
+    """Name, type and field of a parameter; raises BadInput."""
+    key, default, about = str(field["name"]), field["default"], dict(field["metadata"])
+    about["help"] = harmless(about["help"]) if isinstance(about.get("help"), str) else ""
+    where = f"{name}.py: parameter {key[:60]}"
+    if not _NAME.fullmatch(key):
+        raise BadInput(f"{where}: expected a name of small letters, digits and '_'")
+    if not about["help"]:
+        raise BadInput(f"{where} has no help; write metadata={{'help': ..., 'range': (low, high)}}")
+    if choices := about.get("choices"):
+        if default not in choices or not all(isinstance(each, str) and each.isprintable() for each in choices):
+            raise BadInput(f"{where}: default {default!r:.40} is not among its choices, or one cannot be printed")
+        about["choices"] = tuple(choices)
+        return key, str, dataclasses.field(default=default, metadata=about)
+    default, about["range"] = _in_range(where, default, about)
+    return key, float, dataclasses.field(default=default, metadata=about)
 
 
 def _in_range(where: str, default: Any, about: Mapping[str, Any]) -> tuple[float, tuple[float, float]]:

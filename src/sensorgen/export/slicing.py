@@ -16,7 +16,7 @@ from sensorgen.design.design import Design
 from sensorgen.design.printer import tower
 from sensorgen.design.walls import PROGRAMS, SLICERS, TITLES
 from sensorgen.export import threemf
-from sensorgen.export.gcode.drags import Lifted, lift
+from sensorgen.export.gcode.crossings import Lifted, lift
 from sensorgen.export.gcode.motion import Paths, follow, paths_of
 from sensorgen.export.gcode.reading import text_of
 from sensorgen.export.gcode.ready import ready

@@ -23,7 +23,7 @@ from sensorgen.export.slicers import TIME_LIMIT_S
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
-    from sensorgen.export.gcode.drags import Lifted
+    from sensorgen.export.gcode.crossings import Lifted
 
 
 @dataclass(frozen=True)

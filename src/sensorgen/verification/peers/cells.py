@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from sensorgen.core.arrays import Real, Whole
+from sensorgen.scene.repetition import Slice, cell
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import ROUNDING_MM, Section, sections
-from sensorgen.scene.unit_cell import Slice, cell
 from sensorgen.solvers.electrostatics.bounds import unmirrored
 from sensorgen.solvers.electrostatics.boxes import Grid, grid
 

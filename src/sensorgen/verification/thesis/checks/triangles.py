@@ -9,8 +9,8 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design.shapes import tri
 from sensorgen.models import columns, fem2d, thesis_cells
+from sensorgen.scene.repetition import cell
 from sensorgen.scene.sections import sections
-from sensorgen.scene.unit_cell import cell
 from sensorgen.solvers.electrostatics.mesh import Cones
 from sensorgen.solvers.electrostatics.plane import Plane
 from sensorgen.solvers.electrostatics.triangles import triangles as cut
