@@ -105,6 +105,18 @@ def roughly(_cache):
         yield
 
 
+@pytest.fixture
+def unpainted(monkeypatch):
+    """No figure is painted: for tests that look at names of files, or at what stands beside the pictures.
+
+    tests/test_plots.py, test_plots_bench.py and tests/report paint.
+    """
+    from sensorgen.analysis.plots import static
+
+    content = {"png": b"\x89PNG\r\n\x1a\n", "svg": b"<svg/>"}
+    monkeypatch.setattr(static, "_written", lambda *given: content[given[-1]])
+
+
 @pytest.fixture(autouse=True, scope="module")
 def one_kernel():
     """build123d and NGSolve bring two versions of one CAD kernel, which crash together: tests load one or the other."""

@@ -142,21 +142,22 @@ def test_what_is_told_is_found(model, one, stored):
     assert np.abs(told.real - np.real(truth.gain)).max() < 8e-3
 
 
-def _record(model, one):
-    _, known, _, found = one
-    held = held_out(model, known, LIMIT_N)
-    return records.Calibration("S1", "mine", "0" * 16, model, found, 6.0, held[0], ("a",), (1e-3 + 0j,) * 7, ("n",))
+@pytest.fixture(scope="module")
+def held_back(model, one):
+    """Each known press found again from the others."""
+    return held_out(model, one[1], LIMIT_N)
 
 
 @pytest.fixture(scope="module")
-def stored(model, one):
+def stored(model, one, held_back):
     """A calibration as the log keeps it."""
-    return _record(model, one)
+    found, held = one[3], held_back[0]
+    return records.Calibration("S1", "mine", "0" * 16, model, found, 6.0, held, ("a",), (1e-3 + 0j,) * 7, ("n",))
 
 
-def test_its_own_check_on_presses_held_back(model, one):
+def test_its_own_check_on_presses_held_back(model, one, held_back):
     _, known, unseen, found = one
-    held, again = held_out(model, known, LIMIT_N)
+    held, again = held_back
     true = coverage_of(Inverter(model, found, force_limit_n=LIMIT_N).batch(unseen.ratio), unseen.presses)
     assert held.presses == len(again.force_n) == 30
     assert held.force_width_n == pytest.approx(true.force_width_n, rel=0.4)

@@ -179,12 +179,12 @@ def test_bounds_are_the_inverted_fisher_matrix_by_differences(force, place):
 
 
 def test_bounds_are_met_by_fits_to_noisy_readings():
-    """400 least-squares fits: their scatter is that of the bound, known to 1/sqrt(800), and so is the correlation."""
+    """200 least-squares fits: their scatter is that of the bound, known to 1/sqrt(400), and so is the correlation."""
     sensor, noise, random = tri(0.83), 1e-3, np.random.default_rng(7)
     tones, truth, scale = np.array(TONES_HZ), np.array([4.0, 0.04]), np.array([1.0, 0.01])
     clean = sensor.impedance(tones, *truth)
     size, fits = noise * np.abs(clean), []
-    for _ in range(400):
+    for _ in range(200):
         read = clean + size * (random.standard_normal(7) + 1j * random.standard_normal(7))
 
         def misfit(p, read=read):

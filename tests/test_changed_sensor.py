@@ -34,6 +34,13 @@ def specimens(model):
     return made
 
 
+@pytest.fixture(scope="module")
+def resistive(model):
+    """A strip whose resistance tells position, read to 0.01 %, and its calibration."""
+    strip = drawn_at_random(4, noise=1e-4, resistance_ohm=5e4)
+    return strip, calibrated(model, data_of(run(strip, 30, 4), 1e-4))
+
+
 def judged(model, specimen, seed, name, otherwise=OTHERWISE, count=60):
     """Results and truths of presses after a change."""
     strip, known, posterior = specimen
@@ -124,10 +131,9 @@ def test_readings_after_a_changed_rest_say_so(model, specimens):
     assert Rest(bad.rest_ohm, baseline=base).change
 
 
-def test_another_capacitance_is_seen_where_the_frequencies_tell(model):
-    """A hand, on a strip whose resistance tells position, read to 0.01 %; a press alone is not called so."""
-    strip = drawn_at_random(4, noise=1e-4, resistance_ohm=5e4)
-    posterior = calibrated(model, data_of(run(strip, 30, 4), 1e-4))
+def test_another_capacitance_is_seen_where_the_frequencies_tell(model, resistive):
+    """A hand, on a strip whose resistance tells position; a press alone is not called so."""
+    strip, posterior = resistive
     inverter = Inverter(model, posterior, force_limit_n=13.0)
     sound, hand = (
         inverter.batch(data_of(run(one, 60, 9), 1e-4).ratio).verdict for one in (strip, replace(strip, hand_f=3e-13))
@@ -137,14 +143,14 @@ def test_another_capacitance_is_seen_where_the_frequencies_tell(model):
     assert Verdict.MORE.words == "more than one press"
 
 
-def test_a_reading_without_position_is_ok_unless_the_sensor_locates_such_presses(model, specimens):
+def test_a_reading_without_position_is_ok_unless_the_sensor_locates_such_presses(model, specimens, resistive):
     """8.6 kohm hardly locate; 50 kohm do, and not without the frequencies above 3 kHz."""
     found, _ = judged(model, specimens[0], 0, "sound")
     wide = np.ptp(found.position_90_m, axis=1) > 0.8 * LENGTH_M
     assert wide.mean() > 0.1
     assert (found.verdict[wide] == Verdict.OK).mean() > 0.9
-    strip = drawn_at_random(4, noise=1e-4, resistance_ohm=5e4)
-    inverter = Inverter(model, calibrated(model, data_of(run(strip, 30, 4), 1e-4)), force_limit_n=13.0)
+    strip, posterior = resistive
+    inverter = Inverter(model, posterior, force_limit_n=13.0)
     ratio = data_of(run(strip, 60, 9), 1e-4).ratio
     ratio[:, 2:] = np.nan
     few = inverter.batch(ratio)

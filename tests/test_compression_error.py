@@ -110,7 +110,7 @@ def test_few_loads_are_as_good_as_many():
 
 def test_work_and_energy_agree_at_few_loads_and_a_wrong_energy_is_seen(monkeypatch):
     of = case(parameters={"dielectric_mm": 0.1})
-    found = mesh_ladder.pressed(of, [0.0, 1e4, 1e5], keep=False)
+    found = mesh_ladder.pressed(of, [0.0, 1e4, 1e5], -1, keep=False)
     assert found.faults == ()
     assert np.abs(found.imbalance).max() < 2e-3
     monkeypatch.setattr(pressed, "_FIRST", (1.0,))  # as it was: steps of 40 kPa alone
@@ -165,13 +165,13 @@ def test_an_error_of_second_order_is_stated_a_quarter_larger(monkeypatch):
 
 def test_a_coarser_mesh_that_is_stored_serves_as_one_that_is_solved():
     """Stored it has every pressure of the finer mesh; solved for the comparison, one in four."""
-    loads = np.linspace(0.0, 4e4, 10).tolist()
+    loads = np.linspace(0.0, 4e4, 6).tolist()
     fine = mesh_ladder.pressed(case(), loads)
     solved = mesh_ladder._coarser(case(), fine, loads, 0, keep=False)
     mesh_ladder.pressed(case(), loads, -1)
     with cached.only_known():  # else another mesh is solved
         stored = mesh_ladder._coarser(case(), fine, loads, 0, keep=True)
-    assert stored.stress_pa.tolist() == solved.stress_pa.tolist() == [loads[k] for k in (0, 1, 5, 9)]
+    assert stored.stress_pa.tolist() == solved.stress_pa.tolist() == [loads[k] for k in (0, 1, 5)]
     assert stored.displacement_m == pytest.approx(solved.displacement_m, rel=3e-3)
     rises = [mesh_ladder._rise(solution)[0] for solution in (stored, solved)]
     assert rises[0] == pytest.approx(rises[1], rel=5e-3)

@@ -390,7 +390,7 @@ def test_blocks_do_not_show():
 def test_a_wide_posterior_is_better_than_least_squares():
     """Noise above signal: presses from the prior, so that the posterior mean has the least error that there is."""
     rng = np.random.default_rng(5)
-    force, position = rng.uniform(0, 6, 900), rng.uniform(0, 0.1, 900)
+    force, position = rng.uniform(0, 6, 500), rng.uniform(0, 0.1, 500)
     z = noisy(readings(PLATE, TONES, force, position), 3e-3)
     plain = Estimator(PLATE, TONES, 3e-3, force_limit_n=6.0).batch(z)
     known = Estimator(PLATE, TONES, 3e-3, Prior(), force_limit_n=6.0).batch(z)

@@ -17,7 +17,7 @@ from sensorgen.prediction.array.sessions import calibrated, law_of, stored, stud
 PRINT = Insole(elements=20, bad=6, minutes=4.0, rate_hz=1.0)
 
 
-def recorded(insole, days=(0.0, 1.0, 3.0, 5.0, 8.0)):
+def recorded(insole, days=(0.0, 1.0, 3.0, 5.0)):
     found = []
     for day, time_s, counts, kpa in insole.sessions(days):
         none = np.full(len(time_s), np.nan)

@@ -54,7 +54,7 @@ def test_gap_and_capacitance_that_were_asked_for_come_out(film, walls, quality):
 
 def test_a_film_of_one_layer_is_refused_with_the_nearest(monkeypatch, shared_cache):
     """The printer's thinnest layers make 0.12 mm of two: the nearest of a few tries says so, and what it costs."""
-    monkeypatch.setattr(compensation, "_MOST_SOLVED", 6)
+    monkeypatch.setattr(compensation, "_MOST_SOLVED", 3)
     with pytest.raises(OutOfRange, match=r"2 layers at least, 0\.12 mm at layers of 0\.06 mm; nearest: ") as refused:
         compensated(small("rect", SHORT | {"dielectric_mm": 0.1}))
     for words in ("a gap of 0.12 mm and", "quality extrafine", "gap is off by +20%", "22 layers for 13"):
@@ -175,7 +175,7 @@ def test_what_rules_refuse_in_whole_periods_too_is_refused_with_the_rule(monkeyp
         return Review({}, [island] * (design.params.period_mm != 2.0))
 
     monkeypatch.setattr(compensation, "review", with_an_island)
-    monkeypatch.setattr(compensation, "_MOST_SOLVED", 12)
+    monkeypatch.setattr(compensation, "_MOST_SOLVED", 9)
     with pytest.raises(OutOfRange, match=r"walls without an error \(9-bridge, an island .* mid-air\); nearest: "):
         compensated(small(parameters=SHORT | {"dielectric_mm": 0.2}))
 
@@ -193,8 +193,8 @@ def test_a_named_design_gets_a_name_of_its_own():
 
 def test_what_cannot_be_had_is_refused_with_the_nearest(monkeypatch, shared_cache):
     """After fewer tries than usual."""
-    monkeypatch.setattr(compensation, "_MOST_TRIED", 60)
-    monkeypatch.setattr(compensation, "_MOST_SOLVED", 8)
+    monkeypatch.setattr(compensation, "_MOST_TRIED", 30)
+    monkeypatch.setattr(compensation, "_MOST_SOLVED", 4)
     asked = small(parameters={"dielectric_mm": 0.3, "hang_height_mm": 3.0, "length_mm": 6.0, "width_mm": 4.0})
     with pytest.raises(OutOfRange, match=r"cannot be printed of .*; nearest: "):
         compensated(asked, "classic")

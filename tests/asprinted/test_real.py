@@ -196,7 +196,7 @@ def test_the_first_to_be_printed_keeps_its_place_or_the_electrode(real):
     assert won.region(COG).area == pytest.approx(max(width.values()), rel=0.05)
 
 
-def test_a_print_is_predicted_beside_its_drawing(real, unpressed):
+def test_a_print_is_predicted_beside_its_drawing(real, at_rest):
     variant, lines, version = real("arachne", small(parameters={"length_mm": 16.0}))
     made = sliced(variant, lambda: body(variant, lines, slicer=version), version, b"file")
     found = evaluate(made)

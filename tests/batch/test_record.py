@@ -192,6 +192,7 @@ def test_files_of_an_earlier_batch_that_are_no_longer_made_go_and_others_stay(pl
     assert differences(folder) == Differences(extra=("mine.txt",))
 
 
+@pytest.mark.usefixtures("roughly")
 def test_a_design_that_cannot_be_printed_stops_the_batch(plan, tmp_path):
     size = "length_mm: 20, width_mm: 10"
     sound, short = (f"{{shape: tri, parameters: {{{size}{film}}}}}" for film in ("", ", dielectric_mm: 0.0"))

@@ -33,6 +33,7 @@ def test_it_says_what_is_resolved(run, file):
     assert np.shape(data["sigma_kpa"]) == (3, 4)
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_virtual_step_is_inverted(run, file, tmp_path):
     said = run("array", file, "--simulate", "step.npz", "--plot", ".", "--p-short", "1%")
     assert said.code == 0, said.err

@@ -86,6 +86,7 @@ def test_a_full_disk_leaves_nothing_half_there(run, plan, disk):
     assert list(small.rglob("*")) == []
 
 
+@pytest.mark.usefixtures("unpredicted")
 def test_a_file_that_the_printer_could_not_print_is_told_and_ends_with_1(run, plan, tmp_path, monkeypatch):
     """A stand-in for the slicer prints beside the bed."""
     program = tmp_path / "bin" / "prusa-slicer"

@@ -68,6 +68,7 @@ def test_a_film_that_answers_at_once_has_next_to_none(run, tmp_path):
     assert "ends in .png" in run("bench", "hysteresis", "fast.mat", "--rig", "fast.csv", "--plot", "a.jpg").line
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_sets_on_one_scale_and_in_a_table(run, tmp_path):
     plans = {name: made.presses(6, seed=seed) for name, seed in (("a", 1), ("b", 2))}
     for k, (name, plan) in enumerate(plans.items()):

@@ -132,6 +132,7 @@ def test_the_log_with_a_calibration_is_sound(after):
     assert after("log", "verify").code == 0
 
 
+@pytest.mark.usefixtures("roughly")
 def test_the_report_has_it(after):
     said = after("report", "S1", "--format", "md", "-o", "-")
     assert said.code == 0, said.err

@@ -420,8 +420,8 @@ def test_the_whole_walk_in_an_empty_folder(run, models, program):
 
 
 ELLIPSE = (
-    '<svg xmlns="http://www.w3.org/2000/svg" width="20mm" height="12mm" viewBox="0 0 200 120">'
-    '<ellipse cx="100" cy="60" rx="90" ry="50"/></svg>'
+    '<svg xmlns="http://www.w3.org/2000/svg" width="12mm" height="8mm" viewBox="0 0 120 80">'
+    '<ellipse cx="60" cy="40" rx="50" ry="30"/></svg>'
 )
 
 
@@ -436,7 +436,7 @@ def test_a_sensor_cut_to_an_outline_is_sliced_and_predicted(run, program):
     said = run("predict", *words, "--json")
     found = json.loads(said.out)
     assert "oval.prusa.gcode" in json.dumps(found)
-    area, eps = np.pi * 9e-3 * 5e-3, 4.68
+    area, eps = np.pi * 5e-3 * 3e-3, 4.68
     assert found["capacitance"]["value"] == pytest.approx(8.8541878128e-12 * eps * area / 0.6e-3, rel=0.02)
     assert "--border" in run("build", "reference", "--help").out
-    assert "the border is 18 mm" in run("check", *words, "--size", "25x10").line
+    assert "the border is 10 mm" in run("check", *words, "--size", "25x10").line

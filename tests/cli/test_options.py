@@ -222,6 +222,7 @@ def test_the_terminal_shows_all_numbers_at_80_columns(run):
     assert "pF" in run("predict", "tri").out
 
 
+@pytest.mark.usefixtures("unpredicted")
 def test_waived_findings_do_not_stop_a_build(run, tmp_path):
     (tmp_path / "short.yaml").write_text(
         "shape: tri\nparameters: {dielectric_mm: 0}\nwaivers: [{rule: 1-short, reason: a short on purpose}, "

@@ -47,6 +47,7 @@ def test_piezoresistance_in_words_reaches_the_line(run):
         "reference",
         "--sides",
         "free",
+        "--drawn",
         "--set",
         "piezoresistance_etpu=2e-6",
         "--force",
@@ -70,7 +71,7 @@ def test_piezoresistance_in_words_reaches_the_line(run):
 
 
 def test_csv_against_the_line(run):
-    said = run("predict", "reference", "--sides", "free", *PRESSES, "--csv")
+    said = run("predict", "reference", "--sides", "free", "--drawn", *PRESSES, "--csv")
     assert (said.code, said.err) == (0, "")
     rows = rows_of(said.out)
     assert [(row["force_n"], row["position_mm"]) for row in rows] == [(f, x) for f in (0, 3, 6) for x in (20, 50)]
@@ -82,8 +83,8 @@ def test_csv_against_the_line(run):
 
 
 def test_json_and_csv_say_the_same(run):
-    found = json.loads(run("predict", "reference", "--sides", "free", *PRESSES, "--json").out)
-    rows = iter(rows_of(run("predict", "reference", "--sides", "free", *PRESSES, "--csv").out))
+    found = json.loads(run("predict", "reference", "--sides", "free", "--drawn", *PRESSES, "--json").out)
+    rows = iter(rows_of(run("predict", "reference", "--sides", "free", "--drawn", *PRESSES, "--csv").out))
     assert (found["frequency_hz"], found["force_n"], found["position_mm"]) == ([1100, 99700], [0, 3, 6], [20, 50])
     for j, force in enumerate(found["force_n"]):
         for i, x in enumerate(found["position_mm"]):
@@ -104,7 +105,8 @@ def test_json_and_csv_say_the_same(run):
     ],
 )  # fmt: skip
 def test_law_and_tip_reach_the_sensor(run, words, stiffer, tip):
-    said = run("predict", "reference", "--force", "5", "--position", "50", "--frequencies", "50kHz", "--json", *words)
+    press = ("--force", "5", "--position", "50", "--frequencies", "50kHz")
+    said = run("predict", "reference", "--drawn", *press, "--json", *words)
     found = json.loads(said.out)
     assert (found["re_ohm"][0][0][0], found["im_ohm"][0][0][0]) == close(at_point(5e4, 5.0, 50.0, tip, stiffer))
     assert found["tip_mm"] == pytest.approx(tip)
@@ -113,12 +115,17 @@ def test_law_and_tip_reach_the_sensor(run, words, stiffer, tip):
 
 
 def test_axes_that_are_not_named(run):
-    forces = json.loads(run("predict", "reference", "--sides", "free", "--position", "50", "--json").out)
+    forces = json.loads(run("predict", "reference", "--sides", "free", "--drawn", "--position", "50", "--json").out)
     assert (forces["force_n"], forces["position_mm"]) == ([k / 10 for k in range(61)], [50])
     assert forces["frequency_hz"] == [1100, 2300, 5300, 10100, 19900, 49900, 99700]
-    places = json.loads(run("predict", "reference", "--sides", "free", "--length", "50", "--force", "1", "--json").out)
+    places = json.loads(
+        run("predict", "reference", "--sides", "free", "--drawn", "--length", "50", "--force", "1", "--json").out
+    )
     assert (places["force_n"], places["position_mm"]) == ([1], [k / 2 for k in range(101)])
-    assert len(rows_of(run("predict", "reference", "--sides", "free", "--csv", "--frequencies", "1").out)) == 61 * 101
+    assert (
+        len(rows_of(run("predict", "reference", "--sides", "free", "--drawn", "--csv", "--frequencies", "1").out))
+        == 61 * 101
+    )
 
 
 def test_without_a_load(run):
@@ -127,9 +134,11 @@ def test_without_a_load(run):
     assert f"capacitance          69.1 pF ({math.floor(69.06 * least / 4.68)} to 110)" in said.out
     assert 69.06 * most / 4.68 + 5 < 110
     assert "top electrode        1.4 kohm (0.66 to 7.3)" in said.out  # 0.042 (0.02 to 0.088) ohm m, 4.3 kohm
-    found = json.loads(run("predict", "reference", "--sides", "free", "--json", "--frequencies", "1kHz,1MHz").out)
+    found = json.loads(
+        run("predict", "reference", "--sides", "free", "--drawn", "--json", "--frequencies", "1kHz,1MHz").out
+    )
     assert [row["frequency_hz"] for row in found["impedance"]] == [1e3, 1e6]
-    assert "1 MHz" in run("predict", "reference", "--sides", "free", "--frequencies", "1MHz").out
+    assert "1 MHz" in run("predict", "reference", "--sides", "free", "--drawn", "--frequencies", "1MHz").out
 
 
 def span(values):
@@ -182,12 +191,12 @@ def test_a_single_press(run):
 def test_the_card_is_of_the_greatest_press_and_the_noise_asked_for(run):
     """Standard errors go with the noise: those of the plate at 0.1 % are 2.23 N and 225 mm."""
     slots = ["--material", "top_electrode=etpu@thesis-c.1-top", "--material", "bottom_electrode=etpu@thesis-c.1-bottom"]
-    words = ("predict", "reference", "--sides", "free", *PRESSES[:-2], *slots, "--noise", "1%", "--json")
+    words = ("predict", "reference", "--sides", "free", "--drawn", *PRESSES[:-2], *slots, "--noise", "1%", "--json")
     found = json.loads(run(*words).out)["prediction"]["identifiability"]
     assert (found["noise"], found["press"]["force_n"], found["press"]["position_m"]) == (0.01, 6, 0.05)
     assert found["sigma_force_n"] == pytest.approx(22.3, rel=1e-3)
     assert found["sigma_position_m"] == pytest.approx(2.25, rel=1e-3)
-    said = run("predict", "reference", "--sides", "free", *PRESSES, "--noise", "1%").out
+    said = run("predict", "reference", "--sides", "free", "--drawn", *PRESSES, "--noise", "1%").out
     assert "at 1 % noise this design cannot sense force" in said
 
 
@@ -205,7 +214,15 @@ def test_the_verdict_on_a_cell_that_nobody_solved_says_so(run):
 @pytest.mark.parametrize("form", ["--csv", "--json", None])
 @pytest.mark.parametrize("press", [True, False])
 def test_a_file_holds_what_the_terminal_would_show(run, tmp_path, form, press):
-    words = ["predict", "reference", "--sides", "free", *(PRESSES if press else []), *([form] if form else [])]
+    words = [
+        "predict",
+        "reference",
+        "--sides",
+        "free",
+        "--drawn",
+        *(PRESSES if press else []),
+        *([form] if form else []),
+    ]
     words += ["--position", "50"] if form == "--csv" and not press else []
     said = run(*words, "-o", "out.txt")
     assert (said.code, said.out, said.err) == (0, "out.txt\n", "")
@@ -222,7 +239,7 @@ def test_a_file_that_fails_leaves_the_old_one(run, tmp_path, monkeypatch):
 
     (tmp_path / "out.csv").write_text("old")
     monkeypatch.setattr(predict, "csv_blocks", half)
-    said = run("predict", "reference", "--sides", "free", *PRESSES, "--csv", "-o", "out.csv")
+    said = run("predict", "reference", "--sides", "free", "--drawn", *PRESSES, "--csv", "-o", "out.csv")
     assert said.code == 2
     assert "cannot write 'out.csv': No space left on device" in said.line
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("out.csv", "old")]
@@ -232,7 +249,7 @@ def test_a_file_is_put_in_place_of_the_old_one(run, tmp_path):
     """Not written over: who holds the old file open, or links to it, keeps it whole."""
     (tmp_path / "out.csv").write_text("old")
     (tmp_path / "link.csv").hardlink_to(tmp_path / "out.csv")
-    assert run("predict", "reference", "--sides", "free", *PRESSES, "--csv", "-o", "out.csv").code == 0
+    assert run("predict", "reference", "--sides", "free", "--drawn", *PRESSES, "--csv", "-o", "out.csv").code == 0
     assert (tmp_path / "link.csv").read_text() == "old"
 
 
@@ -252,7 +269,7 @@ def test_pictures_are_put_in_their_folder(run, tmp_path, monkeypatch, shared_cac
 def test_pictures(run, tmp_path):
     from sensorgen.analysis import plots
 
-    said = run("predict", "reference", "--sides", "free", *PRESSES, "--plot", "a/b")
+    said = run("predict", "reference", "--sides", "free", "--drawn", *PRESSES, "--plot", "a/b")
     assert (said.code, said.err) == (0, "")
     folder = tmp_path / "a" / "b"
     assert sorted(p.name for p in folder.iterdir()) == sorted(plots.STEPS)
@@ -293,7 +310,7 @@ WRONG = [
 
 @pytest.mark.parametrize(("words", "message"), WRONG, ids=[" ".join(words) for words, _ in WRONG])
 def test_wrong_words(run, tmp_path, words, message):
-    said = run("predict", "reference", "--sides", "free", *words)
+    said = run("predict", "reference", "--sides", "free", "--drawn", *words)
     if message is None:  # one mm and five mm, not one and a half
         assert "2 positions 1 to 5 mm" in said.out
         return
@@ -302,9 +319,12 @@ def test_wrong_words(run, tmp_path, words, message):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_picture_where_a_file_is(run, tmp_path):
+def test_a_picture_where_a_file_is(run, tmp_path, monkeypatch, shared_cache):
+    from sensorgen.analysis import plots
+
+    monkeypatch.setattr(plots, "files", lambda *_: [("identifiability.png", b"")])
     (tmp_path / "p").write_text("mine")
-    said = run("predict", "reference", "--sides", "free", *PRESSES, "--plot", "p")
+    said = run("predict", "reference", "--sides", "free", "--drawn", *PRESSES, "--plot", "p")
     assert said.code == 2
     assert "cannot write 'p/identifiability.png': File exists" in said.line
     assert (tmp_path / "p").read_text() == "mine"
@@ -366,7 +386,7 @@ def test_a_round_tip_presses_harder_in_its_middle_and_moves_less(run):
 
 
 def test_the_budget_stands_below_and_names_its_largest_term(run):
-    lines = run("predict", "reference", "--sides", "free", *PRESSES, "--details").out.splitlines()
+    lines = run("predict", "reference", "--sides", "free", "--drawn", *PRESSES, "--details").out.splitlines()
     assert "error budget at 6 N and 50 mm, at the worst frequency" in lines
     assert any(line.startswith("largest: ") for line in lines)
     assert max(map(len, lines[lines.index("error budget at 6 N and 50 mm, at the worst frequency") :])) <= 80
@@ -374,7 +394,7 @@ def test_the_budget_stands_below_and_names_its_largest_term(run):
 
 @pytest.mark.parametrize("value", ["0", "-1", "nan", "much"])
 def test_an_accuracy_is_a_number_above_0(run, value):
-    said = run("predict", "reference", "--sides", "free", "--accuracy", value)
+    said = run("predict", "reference", "--sides", "free", "--drawn", "--accuracy", value)
     assert said.code == 2
     assert "expected" in said.line
 
@@ -392,6 +412,7 @@ def test_a_round_tip_touches_over_a_length_that_grows(run):
         "reference",
         "--sides",
         "free",
+        "--drawn",
         "--position",
         "50",
         "--profile",
@@ -402,7 +423,7 @@ def test_a_round_tip_touches_over_a_length_that_grows(run):
     one, eight = (json.loads(run(*words, "--force", force, "--json").out)["contact_mm"] for force in ("0.5", "4"))
     assert eight == pytest.approx(2 * one, rel=1e-9)
     assert f"contact {eight:.3g} mm at 4 N" in run(*words, "--force", "4").out
-    said = run("predict", "reference", "--sides", "free", "--force", "1", "--tip-radius", "20")
+    said = run("predict", "reference", "--sides", "free", "--drawn", "--force", "1", "--tip-radius", "20")
     assert said.code == 2
     assert "has no radius" in said.line
-    assert "has no radius" in run("predict", "reference", "--sides", "free", "--tip-radius", "20").line
+    assert "has no radius" in run("predict", "reference", "--sides", "free", "--drawn", "--tip-radius", "20").line

@@ -55,7 +55,7 @@ def test_a_design_is_sliced(run, contents, tmp_path):
     assert json.loads(run("slice", *SMALL, "--name", "a", "--json").out)["tools"][0]["tool"] == 3
 
 
-@pytest.mark.usefixtures("good")
+@pytest.mark.usefixtures("good", "unpredicted")
 def test_a_build_is_left_as_it_is(run, contents, tmp_path):
     assert run("build", *SMALL, "--no-cad", "--name", "a").code == 0
     before = contents(tmp_path / "out")

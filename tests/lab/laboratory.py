@@ -16,6 +16,7 @@ from sensorgen.measure.virtual.mechanics import FAULTS, FaultSchedule, Planted
 from sensorgen.measure.virtual.specimen import PressedSpecimen, drawn
 
 LIMIT_N = 7.0
+CLEARANCE_MM, STROKE_MM = 10.0, 15.0  # a third of the usual ways: a raised stage is out of the piston's reach
 PLAN = [
     {"hold": {"position_mm": 30, "force_n": 4.0, "hold_s": 1.0, "rest_s": 2.0}},
     {"hold": {"position_mm": 70, "force_n": 2.0, "hold_s": 1.0, "rest_s": 2.0}},
@@ -69,12 +70,13 @@ class Laboratory:
 def laboratory(faults: tuple[Planted, ...] = (), **changes: float) -> Laboratory:
     """A new one, with faults planted."""
     clock = SimulatedClock()
-    at = mechanics.VirtualRig(specimen(), mechanics.Mechanics(**{"force_limit_n": LIMIT_N} | changes))
+    short = {"clearance_mm": CLEARANCE_MM, "stroke_mm": STROKE_MM}
+    at = mechanics.VirtualRig(specimen(), mechanics.Mechanics(**short | {"force_limit_n": LIMIT_N} | changes))
     at.planted = watched = Watched(faults, at)
     settings = {"weight_n": at.mechanics.weight_n, "friction_n": at.mechanics.friction_n}
     made = {
         "actuator": catalogue.simulated("smac-lcc10", at, settings, clock),
-        "stage": catalogue.simulated("reprapfirmware", at, {"lift_mm_s": 30.0}, clock),
+        "stage": catalogue.simulated("reprapfirmware", at, {"lift_mm_s": 30.0, "clearance_mm": CLEARANCE_MM}, clock),
         "impedance": catalogue.simulated("handyscope-hs5", at, {}, clock),
     }
     for name, role in (("actuator", "actuator"), ("stage", "stage"), ("analyser", "impedance")):
@@ -125,6 +127,6 @@ DEAF = ("actuator hung", "actuator cut", "actuator stuck", "rig jammed")
 """Faults after which the actuator's motor cannot be switched off from outside: the stage lifts."""
 HARMLESS = ("actuator identity", "stage identity", "analyser in use", "analyser wrong device")
 """What a device says when it is asked who it is, which it is at the begin only: later it works on."""
-MOMENTS = (*({"at_s": s} for s in (0.0, 0.1, 2.0, 6.0, 20.0)), {"at_force_n": 0.1}, {"at_force_n": 3.0})
+MOMENTS = (*({"at_s": s} for s in (0.0, 0.1, 1.0, 4.2, 12.5)), {"at_force_n": 0.1}, {"at_force_n": 3.0})
 """Before the run asks who is there, homing of actuator and stage, first contact, between presses, landing, press."""
 KINDS = [name for name, fault in FAULTS.items() if fault.strikes in ("actuator", "stage", "analyser", "rig")]

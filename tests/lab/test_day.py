@@ -49,7 +49,7 @@ def test_every_command_of_the_page_works_in_its_order(tmp_path, monkeypatch, sha
     assert (tmp_path / "s1.html").exists()
 
 
-@pytest.fixture(scope="module", params=[(8, 4), pytest.param((demo.KNOWN, demo.UNKNOWN), marks=pytest.mark.nightly)])
+@pytest.fixture(scope="module", params=[(6, 2), pytest.param((demo.KNOWN, demo.UNKNOWN), marks=pytest.mark.nightly)])
 def demonstrated(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo") / "lab"
     with pytest.MonkeyPatch.context() as fewer:

@@ -47,13 +47,6 @@ def test_nothing_is_sent_to_anybody_before_all_have_said_who_they_are(tmp_path, 
     assert found.reason.startswith(("actuator", "stage", "impedance"))
 
 
-def test_a_run_without_faults_is_done_within_the_limits(tmp_path):
-    found, lab = outcome(tmp_path)
-    assert (found.end, found.done, found.steps) == ("done", 2, 2)
-    assert lab.mechanism.violations == []
-    assert 3.9 < lab.mechanism.peak_n < 4.2
-
-
 def test_the_limit_holds_where_the_actuator_presses_with_all_it_has(tmp_path):
     found, lab = outcome(tmp_path, (Planted(what="actuator runaway", at_force_n=1.0),), plan=_at_the_limit())
     assert found.end == "fault"

@@ -12,7 +12,7 @@ from sensorgen.measure.log.bench import read_again
 from sensorgen.measure.signal.run import processed
 
 
-def run_and(remove, folder, at_s=20.0):
+def run_and(remove, folder, at_s=12.5):
     """The short experiment, with something removed on the way."""
     lab, log_path = laboratory(), folder / "log.db"
     wait = lab.clock.wait_until

@@ -53,7 +53,7 @@ def test_the_triangle_without_losses():
 
 
 def test_bricks_without_losses():
-    found, bounds = fem3d.lossy(rect_cell(0.1), EPS, 3e-3), fem3d.capacitance(rect_cell(0.1), EPS, 3e-3)
+    found, bounds = fem3d.lossy(rect_cell(0.1), EPS, 1e-2), fem3d.capacitance(rect_cell(0.1), EPS, 1e-2)
     assert (found.centre.real - found.radius, found.centre.real + found.radius) == close(
         (bounds.lower, bounds.upper), 1e-8
     )

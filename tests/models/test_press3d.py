@@ -55,7 +55,14 @@ def pressed_rect():
 
 
 @pytest.mark.parametrize(
-    ("nu", "period"), [(0.3, "fixed"), (0.4999, "fixed"), (0.3, "free"), (0.4999, "free"), (0.5, "free")]
+    ("nu", "period"),
+    [
+        pytest.param(0.3, "fixed", marks=pytest.mark.nightly),
+        (0.4999, "fixed"),
+        (0.3, "free"),
+        pytest.param(0.4999, "free", marks=pytest.mark.nightly),
+        (0.5, "free"),
+    ],
 )
 def test_a_block_follows_the_closed_form(nu, period):
     """Homogeneous neo-Hookean block: stretch a across in both directions, b along the load; at a third of E."""
@@ -106,7 +113,7 @@ def test_the_tangent_is_the_derivative_of_the_residual_and_that_of_the_energy():
     assert (one - other) / (2 * h) == pytest.approx((residual * along).sum(), rel=1e-6, abs=0)
 
 
-@pytest.mark.parametrize(("thick", "stiffer"), [(0.6, 92.6), (0.2, 830.4)])
+@pytest.mark.parametrize(("thick", "stiffer"), [pytest.param(0.6, 92.6, marks=pytest.mark.nightly), (0.2, 830.4)])
 def test_a_bonded_strip_does_not_lock(thick, stiffer):
     """Upper half of a strip 10 mm wide bonded to stiff plates, sides free, incompressible: solved in 2D elsewhere."""
     x = np.append(5 * (1 - (1 - np.linspace(0, 1, 25)) ** 1.5), 5.5)
@@ -285,7 +292,7 @@ def test_the_side_of_a_foot_that_rolls_onto_the_film_touches_it():
 
 def test_feet_that_stick_are_stiffer_by_as_much_as_in_a_cross_section():
     """By how much sticking stiffens, against a fine mesh of the plane model: its first one is 4 % off in that."""
-    scene, stress = stairs(0.3, lift=0.02), [0.0, 1e4, 2e4, 5e4]
+    scene, stress = stairs(0.3, lift=0.02), [0.0, 1e4, 2e4]
     moved = {}
     for kind in ("frictionless", "stick"):
         held = BoundaryConditions(contact=kind)

@@ -88,7 +88,9 @@ def test_the_residual_is_the_derivative_of_the_energy():
     )
 
 
-@pytest.mark.parametrize(("thick", "stiffer"), [(0.6, 94), (0.2, 835), (0.1, 3335)])
+@pytest.mark.parametrize(("thick", "stiffer"), [
+    pytest.param(0.6, 94, marks=pytest.mark.nightly), (0.2, 835), pytest.param(0.1, 3335, marks=pytest.mark.nightly)
+])  # fmt: skip
 def test_a_bonded_strip_is_as_stiff_as_gent_and_lindley_say(thick, stiffer):
     """Half of a strip 10 mm wide, sides free, between stiff plates to which it is bonded; exactly incompressible."""
     mesh = grid(60, 4, wide=5.0, high=thick)

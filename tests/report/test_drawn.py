@@ -139,7 +139,7 @@ def run(*words):
     return cli.main(["report", *words], standalone_mode=False)
 
 
-def test_the_command(thesis, tmp_path, capsys, monkeypatch, shared_cache):
+def test_the_command(thesis, tmp_path, capsys, monkeypatch, shared_cache, unpainted):
     monkeypatch.chdir(tmp_path)
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)

@@ -82,7 +82,7 @@ def test_it_imports_the_scene_and_the_standard_library_only(name):
 
 
 def test_its_defaults_pass_the_checks(name):
-    shorter = {"length_mm": 20.0} if name in ("bump", "cone", "pyramid") else {}  # 640 round bodies take ten seconds
+    shorter = {"length_mm": 10.0} if name in ("bump", "cone", "pyramid") else {}  # 640 round bodies take ten seconds
     design = make({"shape": name, "printer": "diabase-h5", "quality": "fine", "parameters": shorter})
     assert review(design).errors() == []
 
