@@ -22,7 +22,7 @@ from sensorgen.design.design import make
 from sensorgen.export import slicing
 from sensorgen.export.gcode import motion as paths
 from sensorgen.models import fem2d, traxels
-from sensorgen.verification.chart.rectilinear import plate
+from sensorgen.verification.chart.networks import plate
 
 RESULTS = Path(__file__).parent / "results"
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"

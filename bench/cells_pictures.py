@@ -21,9 +21,9 @@ from matplotlib import pyplot as plt
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import tri
 from sensorgen.models import columns, fem2d
+from sensorgen.scene.repetition import cell
 from sensorgen.scene.scene import Body, Fill, Scene, box
 from sensorgen.scene.sections import sections
-from sensorgen.scene.unit_cell import cell
 from sensorgen.solvers.electrostatics.mesh import Cones
 from sensorgen.solvers.electrostatics.plane import Plane
 

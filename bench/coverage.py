@@ -2,7 +2,7 @@
 
 Run as ``python bench/coverage.py [SPECIMENS [FEWER]]``; writes results/coverage.md. ``FEWER`` specimens make the rows
 of a single error, in which they differ by their noise alone. Each specimen (tests/virtual_specimen, which
-shares no line with the package) is pressed 30 times for its calibration and 200 times for the inversion. A twentieth
+shares no line with the package) is pressed 30 times for its calibration and 200 times for the inversion. A fifth
 of ``SPECIMENS`` of another simulator (tests/independent_sensor.py) change after their calibration.
 
 Each coverage has the binomial interval of 95 % (Wilson) of as many presses as are independent: those of a specimen
@@ -21,15 +21,17 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import independent_sensor
 from independent_data import data_of, model_of, none_of
 from sensorgen.prediction.calibration.calibration import inside
-from sensorgen.prediction.calibration.fitting import by_rest, calibrated, gain, prior
+from sensorgen.prediction.calibration.fitting import Data, by_rest, calibrated, gain, rest_gain
 from sensorgen.prediction.calibration.inversion import OTHERWISE, Inverter, Verdict, doubt_rest
 from sensorgen.prediction.calibration.rest import Baseline
+from sensorgen.prediction.calibration.specimen import Presses
 from sensorgen.prediction.inverse.estimator import Estimator
 from virtual_specimen import TONES_HZ
 from virtual_specimen.adapter import ERRORS, LIMIT_N, data, specimen_model, split
 
 RESULTS = Path(__file__).parent / "results" / "coverage.md"
 KNOWN, UNKNOWN, AFTER = 30, 200, 80
+NOISE = 1e-3
 BEFORE = {  # of 12 specimens by the inversion of November 2026, which judged a reading by its ratio to rest alone
     True: {
         0: "- | 0.63 / 0.96", 10: "0.92 | 0.93 / 0.95", "sound": "0.98 | 0.93 / 0.95",
@@ -75,28 +77,57 @@ def told(shares, of, digits=3):
     return f"{np.average(shares, weights=of):.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
 
 
-def row(name, truth_of, model, specimens, known=KNOWN):
+def of_the_simulator(truth_of):
+    """Session of a specimen of the simulator: known presses, others, and how many of the others a design alone gets."""
+
+    def specimen(model, known, seed):
+        truth = truth_of(seed)
+        first, second = split(truth, known, UNKNOWN, seed)
+        other = data(second, truth)
+        return data(first, truth), other, before(model, second, other, truth)
+
+    return specimen
+
+
+def of_the_prior(model, known, seed):
+    """Session of a specimen as the calibration expects them: drawn from its own prior, read with its own noise."""
+    rng, spread, n = np.random.default_rng(seed), model.spread, known + UNKNOWN
+    at = rng.standard_normal(len(model.names))
+    unloading = np.where(rng.random(n) < 0.5, 0.0, abs(rng.normal(0.25, 0.25, n)))
+    presses = Presses(
+        rng.uniform(0.1, 6, n), rng.uniform(0, model.sensor.length_m, n), unloading, rng.normal(0.5, 0.6, n)
+    )
+    changes = rng.standard_normal((n, 3)) * [spread.scatter, spread.wander, spread.wander]
+    ratio = np.concatenate([model.ratio(at, presses.rows([k]), changes[k]) for k in range(n)])
+    noise = np.full(ratio.shape, NOISE)
+    ratio = ratio + NOISE * (rng.standard_normal(ratio.shape) + 1j * rng.standard_normal(ratio.shape))
+    real, imaginary = np.split(np.linalg.cholesky(rest_gain(model)) @ rng.standard_normal(2 * len(TONES_HZ)), 2)
+    rest = model.rest(at) + real + 1j * imaginary
+    every = Data(presses, ratio, noise, rest, noise[0] / n**0.5)
+    return every.rows(np.arange(known)), every.rows(np.arange(known, n)), (np.nan,) * 3
+
+
+def row(name, specimen, model, specimens, known=KNOWN):
     """Means over specimens, and tenth percentiles."""
     rows, seconds, verdicts = [], [], np.zeros(len(Verdict), int)
     for seed in range(specimens):
-        truth = truth_of(seed)
-        first, second = split(truth, known, UNKNOWN, seed)
-        one, other = data(first, truth), data(second, truth)
+        one, other, exact = specimen(model, known, seed)
         start = time.process_time()
-        posterior = calibrated(model, one) if known else prior(model, other.noise[0])
+        posterior = calibrated(model, one) if known else by_rest(model, other.rest, other.rest_noise, other.noise[0])
         middle = time.process_time()
-        found = Inverter(model, posterior, force_limit_n=LIMIT_N).batch(other.ratio)
+        inverted = Inverter(model, posterior, force_limit_n=LIMIT_N).batch(other.ratio)
         seconds.append((middle - start, (time.process_time() - middle) / UNKNOWN))
-        verdicts += np.bincount(found.verdict, minlength=len(Verdict))
-        force, position = inside(found, other.presses)
-        widths = np.median(np.ptp(found.force_90_n, axis=1)), 1e3 * np.median(np.ptp(found.position_90_m, axis=1))
-        rows.append([*before(model, second, other, truth), force.mean(), position.mean(), *widths])
+        verdicts += np.bincount(inverted.verdict, minlength=len(Verdict))
+        force, position = inside(inverted, other.presses)
+        widths = np.median(np.ptp(inverted.force_90_n, axis=1)), 1e3 * np.median(np.ptp(inverted.position_90_m, axis=1))
+        rows.append([*exact, force.mean(), position.mean(), *widths])
     ok, force0, position0, force, position, wide_n, wide_mm = np.mean(rows, axis=0)
     by_specimen = np.array(rows)[:, 3:5].T
     tenth = np.percentile(np.array(rows)[:, 3:5], 10, axis=0)
-    print(name, np.round([force, position, *tenth], 3), flush=True)
+    print(name, known, np.round([force, position, *tenth], 3), flush=True)
+    exact = "- | -" if np.isnan(ok) else f"{ok:.0%} | {force0:.0%} / {position0:.0%}"
     return (
-        f"| {name} | {specimens} | {known} | {ok:.0%} | {force0:.0%} / {position0:.0%} | "
+        f"| {name} | {specimens} | {known} | {exact} | "
         f"{' / '.join(told(shares, UNKNOWN) for shares in by_specimen)} | "
         f"{tenth[0]:.2f} / {tenth[1]:.2f} | {wide_n:.2f} N | {wide_mm:.0f} mm | "
         f"{verdicts[Verdict.NO_FIT] / verdicts.sum():.1%} |"
@@ -113,14 +144,14 @@ def after(model, posterior, reference, strip, seed, where):
     inverter = Inverter(
         model, posterior, force_limit_n=7.5 if known else 13.0, otherwise=OTHERWISE if known else 0.0
     )  # fmt: skip
-    found = inverter.batch(unseen.ratio, changed=changed)
-    doubt_rest(found, np.zeros(AFTER, bool), 0)
-    ok = found.verdict == Verdict.OK
+    inverted = inverter.batch(unseen.ratio, changed=changed)
+    doubt_rest(inverted, np.zeros(AFTER, bool), 0)
+    ok = inverted.verdict == Verdict.OK
     return (
         ok,
-        ok | (found.verdict == Verdict.FORCE_ONLY),
-        *inside(found, unseen.presses),
-        np.ptp(found.force_90_n, axis=1),
+        ok | (inverted.verdict == Verdict.FORCE_ONLY),
+        *inside(inverted, unseen.presses),
+        np.ptp(inverted.force_90_n, axis=1),
     )
 
 
@@ -177,24 +208,31 @@ def main():
     specimens = int(sys.argv[1]) if len(sys.argv) > 1 else 200
     fewer = int(sys.argv[2]) if len(sys.argv) > 2 else specimens
     warnings.simplefilter("ignore")
-    changed = changes_text(max(specimens // 20, 3))
+    changed = changes_text(max(specimens // 5, 3))
     model, lines, seconds = specimen_model(), [], []
-    cases = [(name, truth_of, KNOWN) for name, truth_of in ERRORS.items()]
-    cases += [("all at once", ERRORS["all at once"], known) for known in (0, 10, 100)]
-    for case in cases:
-        line, took = row(case[0], case[1], model, specimens if case[0].startswith("all") else fewer, case[2])
+    cases = [(name, of_the_simulator(truth_of), KNOWN) for name, truth_of in ERRORS.items()]
+    cases += [("all at once", of_the_simulator(ERRORS["all at once"]), known) for known in (0, 10, 100)]
+    cases += [("all, drawn from the prior", of_the_prior, known) for known in (0, 10, KNOWN)]
+    for name, specimen, known in cases:
+        line, took = row(name, specimen, model, specimens if name.startswith("all") else fewer, known)
         lines.append(line)
         seconds.append(took)
     fit, invert = np.median(seconds, axis=0)
     head = (
         f"Design: tri 0.2 mm, 100 mm, tip 5 mm, seven tones, noise 0.1 %; {UNKNOWN} presses each of "
         "0.1 to 6 N, half of them after a higher one, held for 0.3 to 30 s. In brackets the binomial interval of 95 %, "
-        "of as many presses as the scatter between specimens makes independent.\n\n"
+        "of as many presses as the scatter between specimens makes independent. Without known presses a reading at "
+        "rest is all that is known of a specimen.\n\n"
         "| what is off | specimens | known presses | before: ok | force / place covered | now: force / place covered "
         "| tenth percentile | median width | | no fit |\n|---|---|---|---|---|---|---|---|---|---|\n"
     )
     foot = (
-        f"\n\nA calibration takes {fit:.2f} s of processor time; an inversion in a batch {1e3 * invert:.2f} ms, its "
+        "\n\nSpecimens of a single error hold more than 90 % because they have neither scatter nor wander, "
+        "hysteresis, creep or leak, which 30 presses cannot exclude; those with all errors, without known presses, "
+        "because they vary less than the prior: R by 20 % against a factor of 3.3 (one standard deviation), C by 15 "
+        "against 20 %, the rise by 11 against 22 %, as their modulus is that of the design. Specimens drawn from the "
+        "prior do not.\n"
+        f"\nA calibration takes {fit:.2f} s of processor time; an inversion in a batch {1e3 * invert:.2f} ms, its "
         "table included.\n"
     )
     RESULTS.write_text(head + "\n".join(lines) + foot + changed)

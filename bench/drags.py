@@ -11,7 +11,7 @@ from pathlib import Path
 from sensorgen.asprinted.pinholes import pinholes
 from sensorgen.design.design import make
 from sensorgen.export.gcode.check import check
-from sensorgen.export.gcode.drags import lift
+from sensorgen.export.gcode.crossings import lift
 from sensorgen.export.gcode.reading import text_of
 from sensorgen.export.slicing import alone, sliced
 

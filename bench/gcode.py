@@ -50,7 +50,7 @@ print(json.dumps({"lines": made.lines, "version": made.slicer.version, "slicer_s
 """
 
 DRAGS = (
-    CHECK.replace("gcode.check import check", "gcode.drags import drags")
+    CHECK.replace("gcode.check import check", "gcode.crossings import drags")
     .replace("check(Path", "drags(Path")
     .replace('"lines": result.lines', '"lines": Path(sys.argv[1]).read_bytes().count(b"\\n")')
     .replace("len(result.errors())", "0")

@@ -20,8 +20,7 @@ from sensorgen.core import cache
 from sensorgen.core.parallel import in_parallel, open_lanes
 from sensorgen.workflows.optimise import ladder
 from sensorgen.workflows.optimise.front import Workers, search
-from sensorgen.workflows.optimise.space import candidates
-from sensorgen.workflows.optimise.target import load
+from sensorgen.workflows.optimise.target import candidates, load
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "results" / "optimise.md"

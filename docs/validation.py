@@ -15,7 +15,7 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.design import Design, make
 from sensorgen.design.values import CONTACTS_OHM
 from sensorgen.measure.log import Log
-from sensorgen.measure.log.importing import thesis
+from sensorgen.measure.log.exchange import thesis
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import Query

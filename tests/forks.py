@@ -11,7 +11,8 @@ import gc, json, os, resource, selectors, sys
 import h5py, numpy, scipy.signal
 from sensorgen.checks import review
 from sensorgen.cli import bench_command, log_command, main, printing
-from sensorgen.measure.log import Log, importing, notes, verify
+from sensorgen.measure.log import Log, notes, verify
+from sensorgen.measure.log import exchange
 from sensorgen.measure.signal import run
 from sensorgen.workflows import api, batch, build
 

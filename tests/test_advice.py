@@ -19,9 +19,8 @@ from sensorgen.prediction.results import resolved
 from sensorgen.prediction.slices import reviewed
 from sensorgen.workflows import moves
 from sensorgen.workflows.advice import AdviceSearch, advise, advised
-from sensorgen.workflows.changes import effects
 from sensorgen.workflows.decision import decision
-from sensorgen.workflows.trial import trial
+from sensorgen.workflows.trial import effects, trial
 
 DOCS = Path(__file__).parents[1] / "docs"
 OFF_GRID = """# my plate

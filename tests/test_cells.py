@@ -5,10 +5,10 @@ from collections import defaultdict
 import pytest
 
 from sensorgen.design.shapes import reference, tri
-from sensorgen.scene import unit_cell as cells
+from sensorgen.scene import repetition as cells
+from sensorgen.scene.repetition import SectionCell, cell
 from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 from sensorgen.scene.sections import ROUNDING_MM, sections
-from sensorgen.scene.unit_cell import SectionCell, cell
 
 HEIGHT_MM = 1.4
 

@@ -181,6 +181,18 @@ def test_absent_programs_say_so(monkeypatch, unpressed):
     assert "which is not independent" in found._repr_html_()
 
 
+def test_a_chart_without_any_answer_says_why(unpressed):
+    """As where every process ends for want of memory."""
+
+    def ended(work):
+        raise SensorgenError("the process ended before its answer")
+
+    found = results.chart(bodies.drawn(small()), QUERY, ("capacitance",), budget_s=0.05, runner=ended)
+    assert not found.points
+    assert "the process ended before its answer" in found._repr_html_()
+    assert not "".join(found.csv())
+
+
 @pytest.mark.nightly
 def test_the_whole_prediction():
     """The thesis's cell: two other programs have its rise, and a third one its capacitance."""

@@ -20,9 +20,9 @@ from sensorgen.analysis.fit.estimates import Fit, Fitted, OfSpecimen, Untold, _t
 from sensorgen.cli import cli
 from sensorgen.core.document import text as document_text
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
-from sensorgen.design import materials
+from sensorgen.design import materials, packs
 from sensorgen.design.design import make
-from sensorgen.design.materials import own
+from sensorgen.design.materials import source_folder, source_path
 from sensorgen.design.specimen_name import design_of, parse
 from sensorgen.measure.log import Log, bench, notes, prints
 from sensorgen.measure.signal.verdicts import across_ohm, along_ohm
@@ -36,7 +36,7 @@ from sensorgen.prediction.rest_state import lost, rest_state
 
 @pytest.fixture(autouse=True)
 def _own(monkeypatch, tmp_path):
-    monkeypatch.setenv(own.PLACE, str(tmp_path / "materials"))
+    monkeypatch.setenv(packs.SOURCES, str(tmp_path / "materials"))
 
 
 def value(made, quantity):
@@ -45,10 +45,10 @@ def value(made, quantity):
 
 @pytest.fixture(scope="module")
 def of_thesis(tmp_path_factory):
-    from sensorgen.measure.log import importing
+    from sensorgen.measure.log import exchange
 
     with Log(tmp_path_factory.mktemp("fit") / "log.db", create=True) as log, roughly_at_rest():
-        importing.thesis(log)
+        exchange.thesis(log)
         return fit(log, 23)
 
 
@@ -149,8 +149,8 @@ def test_specimens_held_back_have_no_say(tmp_path):
 
 
 def test_the_next_prediction_takes_the_source(of_thesis, tmp_path):
-    own.place().mkdir()
-    own.path("fit-23").write_text(text(of_thesis), "utf-8")
+    source_folder().mkdir()
+    source_path("fit-23").write_text(text(of_thesis), "utf-8")
     rho = value(of_thesis, "resistivity_ohm_m").value
     taken = {"top_electrode": "etpu@fit-23", "bottom_electrode": "etpu@fit-23"}
     design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}, "materials": taken})
@@ -164,17 +164,17 @@ def test_the_next_prediction_takes_the_source(of_thesis, tmp_path):
 
 def test_a_source_changes_no_design_that_does_not_name_it(of_thesis):
     before = make({"shape": "tri"}).id()
-    own.place().mkdir()
-    own.path("fit-23").write_text(text(of_thesis), "utf-8")
+    source_folder().mkdir()
+    source_path("fit-23").write_text(text(of_thesis), "utf-8")
     assert make({"shape": "tri"}).id() == before
     named = make({"shape": "tri", "materials": {"top_electrode": "etpu@fit-23"}}).id()
-    own.path("fit-23").write_text(re.sub(r"(value: 0\.0\d)", r"\g<1>1", text(of_thesis)), "utf-8")
+    source_path("fit-23").write_text(re.sub(r"(value: 0\.0\d)", r"\g<1>1", text(of_thesis)), "utf-8")
     assert make({"shape": "tri", "materials": {"top_electrode": "etpu@fit-23"}}).id() != named
 
 
 def test_a_source_that_is_silent_falls_back_to_the_default(of_thesis):
-    own.place().mkdir()
-    own.path("fit-23").write_text(text(of_thesis), "utf-8")
+    source_folder().mkdir()
+    source_path("fit-23").write_text(text(of_thesis), "utf-8")
     found = materials.load("etpu", ["fit-23"])
     assert found.value("youngs_modulus_pa", "fit-23").source == "thesis-3.2"
     assert found.value("resistivity_ohm_m").source == "thesis-d.1"
@@ -196,8 +196,8 @@ def test_a_source_that_is_silent_falls_back_to_the_default(of_thesis):
     ],
 )
 def test_damaged_sources_are_told_with_their_file(content, error, said):
-    own.place().mkdir()
-    own.path("fit-1").write_text(content, "utf-8")
+    source_folder().mkdir()
+    source_path("fit-1").write_text(content, "utf-8")
     with pytest.raises(error, match=said) as caught:
         make({"shape": "tri", "materials": {"top_electrode": "etpu@fit-1"}})
     assert "fit-1.yaml" in str(caught.value)
@@ -205,8 +205,8 @@ def test_damaged_sources_are_told_with_their_file(content, error, said):
 
 
 def test_a_source_cannot_have_the_name_of_one_that_ships():
-    own.place().mkdir()
-    own.path("thesis-3.1").write_text("about: a\nmaterials: {etpu: {resistivity_ohm_m: {value: 1}}}", "utf-8")
+    source_folder().mkdir()
+    source_path("thesis-3.1").write_text("about: a\nmaterials: {etpu: {resistivity_ohm_m: {value: 1}}}", "utf-8")
     with pytest.raises(BadInput, match="ships with sensorgen"):
         materials.load("etpu", ["thesis-3.1"])
 
@@ -260,8 +260,8 @@ def test_a_leak_comes_back_in_the_next_prediction(tmp_path):
     with Log(tmp_path / "log.db", create=True) as log:
         bench.log_recording(log, name, *bench_files.write(tmp_path, "run", sensor, count=3))
         made = fit(log, 30)
-    own.place().mkdir()
-    own.path("fit-30").write_text(text(made), "utf-8")
+    source_folder().mkdir()
+    source_path("fit-30").write_text(text(made), "utf-8")
     taken = {"top_electrode": "etpu@fit-30", "bottom_electrode": "etpu@fit-30", "dielectric": "x60@fit-30"}
     plain = Query(law="unconfined")  # no load is asked for
     fitted = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}, "materials": taken})
@@ -363,12 +363,12 @@ def test_the_command(tmp_path, capsys):
         for k in range(6):
             log.add([notes.reading(f"60 triX .1mm {k + 1}", f"{600 + 10 * k}", "OL")])
     assert not cli.main(["fit", "--iteration", "60", "--log", place, "--dry-run"], standalone_mode=False)
-    assert own.names() == []
+    assert packs.source_names() == []
     cli.main(["fit", "--iteration", "60", "--log", place], standalone_mode=False)
     said = capsys.readouterr().out
     assert "--material electrode=etpu@fit-60" in said
     assert "not determined: relative_permittivity" in said
-    assert own.names() == ["fit-60"]
+    assert packs.source_names() == ["fit-60"]
     with pytest.raises(SensorgenError):
         cli.main(["fit", "--iteration", "61", "--log", place], standalone_mode=False)
 
@@ -388,9 +388,9 @@ def test_specimens_of_any_name(tmp_path, capsys):
     cli.main(["fit", "S1", "S2", "S3", "--drawn", "--log", place], standalone_mode=False)
     said = " ".join(capsys.readouterr().out.split())
     assert "S1, S2, S3: fitted to 3, 0 held back" in said
-    (source,) = own.names()
+    (source,) = packs.source_names()
     assert source.startswith("fit-s1-")
-    fitted = yaml.safe_load(own.path(source).read_text("utf-8"))["materials"]
+    fitted = yaml.safe_load(source_path(source).read_text("utf-8"))["materials"]
     eps = fitted["x60"]["relative_permittivity"]
     data = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}, "materials": {"dielectric": f"x60@{source}"}}
     assert rest_state(drawn(make(data)), ranges=False).capacitance.value * 1e12 == pytest.approx(1.2 * c_pf, rel=0.02)
@@ -402,7 +402,7 @@ def test_specimens_of_any_name(tmp_path, capsys):
         cli.main(["fit", name, "--drawn", "--dry-run", "--log", place], standalone_mode=False)
     capsys.readouterr()
     cli.main(["fit", "S1", "S2", "S3", "S4", "S5", "--drawn", "--log", place], standalone_mode=False)
-    assert len(own.names()) == 2  # other specimens, another source
+    assert len(packs.source_names()) == 2  # other specimens, another source
     said = " ".join(capsys.readouterr().out.split())
     assert "relative_permittivity" in said.partition("not determined")[0]
     assert "resistivity_ohm_m" in said.partition("not determined")[0]

@@ -12,7 +12,7 @@ from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design import materials
 from sensorgen.design.design import make
-from sensorgen.design.materials import own
+from sensorgen.design.materials import source_folder, source_path
 from sensorgen.design.values import piezoresistance
 from sensorgen.models import compression, line
 from sensorgen.models.pressure import bed, hertz
@@ -152,8 +152,8 @@ def design(rise=None, **rest):
 
 
 def source(name, rise):
-    own.place().mkdir(exist_ok=True)
-    own.path(name).write_text(
+    source_folder().mkdir(exist_ok=True)
+    source_path(name).write_text(
         f"about: a lab\nmaterials: {{etpu: {{piezoresistance_per_pa: {{value: {rise}}}}}}}", "utf-8"
     )
     return f"etpu@{name}"

@@ -6,7 +6,7 @@ import pytest
 
 from sensorgen.core import cache as cached
 from sensorgen.core import files as places
-from sensorgen.design.materials import own
+from sensorgen.design.materials import source_folder
 from sensorgen.measure.log import logbook
 
 VARIABLES = (
@@ -17,7 +17,7 @@ VARIABLES = (
     "SENSORGEN_LOG",
     "SENSORGEN_MATERIALS",
 )
-CACHE, LOG, MATERIALS = cached.folder, logbook.place, own.place
+CACHE, LOG, MATERIALS = cached.folder, logbook.place, source_folder
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from sensorgen.analysis.plots.figure import thinned
 from sensorgen.measure.recording import Recording, RecordingClock, Source
 from sensorgen.measure.recording.samples import blank
 from sensorgen.measure.signal import lowpass, presses
-from sensorgen.measure.signal.schedule import RunPlan
+from sensorgen.measure.signal.presses import RunPlan
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_pictures_are_drawn_and_the_same_every_time(run):
 
 
 def test_a_surface_goes_through_its_presses(run):
-    through = bench.difference_surface(run.pairs, "reactance")
+    through = presses.surface(run.pairs.force_n, run.pairs.position_mm, run.pairs.difference_ohm.imag)
     assert through.values.shape[2] == 3
     assert np.nanmax(through.values[..., 0]) == pytest.approx(run.pairs.difference_ohm[:, 0].imag.max(), rel=0.1)
 

@@ -8,9 +8,9 @@ import pytest
 
 from sensorgen.design.design import make
 from sensorgen.measure.log import Log
+from sensorgen.measure.log.prints import predicted_rows
 from sensorgen.workflows.build import build
 from sensorgen.workflows.sealed import Differences, build_differences, seal
-from sensorgen.workflows.stored_prediction import predicted_rows
 
 SMALL = {"shape": "reference", "parameters": {"length_mm": 12.0, "width_mm": 8.0}, "name": "x"}
 

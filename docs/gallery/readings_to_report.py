@@ -8,7 +8,7 @@ from pathlib import Path
 
 import sensorgen as sg
 from sensorgen.measure.log import notes
-from sensorgen.workflows.stored_prediction import predict
+from sensorgen.measure.log.prints import predict
 
 folder = Path(tempfile.mkdtemp())
 with sg.Log(folder / "log.db", create=True) as log:

@@ -12,12 +12,13 @@ from sensorgen.core import document
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.measure.array_frames import read
-from sensorgen.measure.virtual.array import foot, simulated, step
+from sensorgen.measure.virtual.array import foot, nodal, simulated, step
 from sensorgen.prediction.array import frames as frames_module
 from sensorgen.prediction.array.frames import PressureMaps, inverted
 from sensorgen.prediction.array.model import array_model
-from sensorgen.prediction.array.readout import ArrayReadout
+from sensorgen.prediction.array.readout import ArrayReadout, broken_where_dead, faulty
 from sensorgen.prediction.array.study import study
+from sensorgen.solvers.tracks import readings
 
 TRI = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
 PRESSURE = np.random.default_rng(1).uniform(0, 300, (2, 5, 6)) * 1e3  # Pa
@@ -132,6 +133,38 @@ def test_what_is_not_read_is_not_no_pressure(model):
     assert np.isnan(broken.pressure_kpa[:, 1, 3:]).all()
     assert np.isnan(broken.pressure_kpa).sum() == 2 * 3
     assert static.png(plots.figure(broken, PRESSURE))[:4] == b"\x89PNG"
+
+
+@pytest.mark.parametrize(
+    ("faults", "columns_turned"),
+    [(["r2:4"], False), (["r4:0"], False), (["c3:2", "r5:1"], False), (["r1:3", "c2:1"], True)],
+)
+def test_a_track_is_broken_where_its_crossings_are_dead_to_the_end(model, faults, columns_turned):
+    tracks = model.tracks()
+    if columns_turned:  # leads at the other end
+        tracks = replace(tracks, row_end=0 * tracks.row_end, column_end=0 * tracks.column_end)
+    true = faulty(tracks, faults, model.here)
+    dead = np.abs(readings(true, 1e3).siemens) < np.abs(readings(tracks, 1e3).siemens) / 3
+    dead[0, 0] = True  # by itself
+    known = broken_where_dead(tracks, model.here, dead)
+    for name in ("row_ohm", "column_ohm", "row_lead_ohm", "column_lead_ohm"):
+        assert np.array_equal(getattr(known, name), getattr(true, name)), name
+
+
+def test_beside_a_short_the_loose_part_of_a_broken_row_mixes_crossings_that_are_not_determined(model):
+    """Row 2 is broken behind column 3, row 4 shorted in column 5; all that a map has is right to 1 kPa."""
+    readout = ArrayReadout(frequency_hz=(1e3,), noise=1e-5)
+    fault = faulty(model.tracks(), ["r2:3", "r4c5"], model.here)
+    rest = model.capacitances(1 + 0.1 * np.random.default_rng(2).normal(size=(5, 6)))
+    ratios = [np.ones((5, 6))] * 3 + [model.under(p)[0] for p in PRESSURE]
+    solved = [nodal(fault, rest * ratio, readout) for ratio in ratios]
+    mixed = maps(model, readout, np.array(solved))
+    lost = np.zeros((5, 6), bool)
+    lost[1, 3:] = lost[3, 3:] = True
+    assert (np.isnan(mixed.pressure_kpa) == lost).all()
+    assert np.nanmax(np.abs(mixed.pressure_kpa - PRESSURE / 1e3)) < 1
+    assert mixed.faults == ("r4c5", "r2:3")
+    assert "faults at rest" in "".join(document.text(mixed.document()))
 
 
 def test_force_and_centre_count_lost_crossings_by_those_around(model):

@@ -5,7 +5,7 @@ import pytest
 
 from sensorgen.core.findings import most_severe
 from sensorgen.design.design import make
-from sensorgen.export.slicers import PROGRAMS
+from sensorgen.design.walls import PROGRAMS
 from sensorgen.prediction.new_slice import slice_now
 from sensorgen.prediction.slices import reviewed
 from sensorgen.workflows.optimise.ladder import everything

@@ -132,6 +132,23 @@ def test_noise_is_not_widened_as_scatter_of_sessions_is(count):
     assert (np.abs(mean - kpa) < half)[1000:].mean() == pytest.approx(0.9, abs=0.02)
 
 
+@pytest.mark.parametrize(("alike", "share"), [(True, 0.02), (False, 0.0)])
+def test_what_is_alike_in_all_elements_is_an_error_of_the_total_force(alike, share):
+    """Frames that are 2 % off in all elements, or in each by itself; presses of one element say nothing of it."""
+    draw, (frames, sessions) = np.random.default_rng(6), (2000, 3)
+
+    def recorded(k):
+        kpa = np.tile(draw.uniform(50, 300, (frames, 1)), 5)
+        kpa[0] = 0.0
+        single = made(kpa * (np.arange(5) == (np.arange(frames) % 5)[:, None]))
+        off = 1 + 0.02 * draw.normal(size=(frames, 1) if alike else kpa.shape)
+        bladder = made(kpa)
+        return single if k == 1 else replace(bladder, reading=bladder.reading * off)
+
+    known = calibrated([recorded(k) for k in range(sessions)], LawForm(powers=1))
+    assert known.common == pytest.approx(share * np.sqrt(1 + 1 / sessions), rel=0.05, abs=3e-3)
+
+
 def test_noise_of_readings_does_not_flatten_the_law():
     """Least squares take a gain for g / (1 + n s^2 / sum x^2), s the noise: here 0.79 g, and the mean over elements."""
     count, zeros, s, gain = 100, 400, 4.0, 2.0

@@ -19,7 +19,7 @@ from sensorgen.asprinted.beads import Beads
 from sensorgen.asprinted.pinholes import CoveredFilm, draws, findings, opened, pinholes, through
 from sensorgen.design.design import make
 from sensorgen.export.gcode import motion as paths
-from sensorgen.measure.log import Log, importing
+from sensorgen.measure.log import Log, exchange
 from sensorgen.measure.log.entries import Reading
 
 PLAN = shapely.box(0, 0, 10, 10)
@@ -282,7 +282,7 @@ def test_six_layers_are_below_a_fifth_if_prints_show_that_layers_help():
 
 def test_a_log_of_the_same_table_does_not_count_twice(tmp_path):
     with Log(tmp_path / "log.db", create=True) as log:
-        importing.thesis(log)
+        exchange.thesis(log)
         assert verdicts(log, make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})) == (0, 0)
         assert verdicts(log, make({"shape": "rect", "parameters": {"dielectric_mm": 0.0}}))[1] > 0  # of other series
 

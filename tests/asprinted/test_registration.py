@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from sensorgen.asprinted import agreement
-from sensorgen.asprinted.registration import pieces, placed
+from sensorgen.asprinted.beads import pieces, placed
 from sensorgen.core.errors import BadInput
 from sensorgen.export import slicing
 from sensorgen.export.gcode.motion import follow

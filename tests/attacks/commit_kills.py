@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from sensorgen.measure.log import BenchRun, Log, Reading, files, sync, verify
-from sensorgen.measure.log.importing import thesis_readings
+from sensorgen.measure.log.exchange import thesis_readings
 
 FAULT = ctypes.CDLL(None)
 OLD = Path(__file__).parents[1] / "reference" / "0645a80"

@@ -14,7 +14,7 @@ import pytest
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.measure.log import Log, verify
-from sensorgen.measure.log.importing import thesis_readings
+from sensorgen.measure.log.exchange import thesis_readings
 from sensorgen.measure.log.prints import prediction
 
 HERE = Path(__file__).parent

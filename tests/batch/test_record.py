@@ -10,7 +10,7 @@ import pytest
 from sensorgen.core.errors import BadInput, Unprintable, Unwritable
 from sensorgen.design import design
 from sensorgen.design.specimen_name import parse
-from sensorgen.measure.log import Log, importing
+from sensorgen.measure.log import Log, exchange
 from sensorgen.prediction.bodies import estimated
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import to_json
@@ -152,7 +152,7 @@ def test_verify_finds_links_and_keys_that_stand_twice(copy, tmp_path):
 
 def test_a_record_that_was_sealed_anew_is_found_by_the_log(copy, tmp_path):
     with Log(tmp_path / "log.db", create=True) as log:
-        importing.import_file(log, copy / RECORD, {})
+        exchange.import_file(log, copy / RECORD, {})
         assert not differences(copy, log)
         data = read(copy)
         data["tools"][next(iter(data["tools"]))]["lot"] = "another"

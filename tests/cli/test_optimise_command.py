@@ -25,8 +25,7 @@ from sensorgen.workflows.optimise import front, ladder, result
 from sensorgen.workflows.optimise.front import Front, Reason, _objectives, sample, search, settled
 from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended
 from sensorgen.workflows.optimise.run import _robust, within_tolerance
-from sensorgen.workflows.optimise.space import MOST, candidates, space
-from sensorgen.workflows.optimise.target import Target, load
+from sensorgen.workflows.optimise.target import MOST, Target, candidates, load, space
 from sensorgen.workflows.templates import new
 
 DOCS = Path(__file__).parents[2] / "docs"

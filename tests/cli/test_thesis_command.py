@@ -5,9 +5,7 @@ import json
 import pytest
 
 from sensorgen.verification import thesis
-from sensorgen.verification.thesis.items import chapter
-from sensorgen.verification.thesis.reproduced import ReproducedItem, row
-from sensorgen.verification.thesis.verdicts import UNEXPLAINED, ItemVerdict
+from sensorgen.verification.thesis.items import UNEXPLAINED, ItemVerdict, ReproducedItem, chapter, row
 
 
 @pytest.fixture

@@ -12,8 +12,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.design.printer import load_printer
 from sensorgen.export.gcode.check import check
-from sensorgen.export.gcode.crossings import PrintedLines, crossings
-from sensorgen.export.gcode.drags import drags, lift
+from sensorgen.export.gcode.crossings import PrintedLines, crossings, drags, lift
 from sensorgen.export.gcode.motion import follow
 
 DIABASE, XL = load_printer("diabase-h5"), load_printer("prusa-xl5")

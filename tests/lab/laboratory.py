@@ -12,7 +12,7 @@ from sensorgen.measure.lab.devices import SimulatedClock
 from sensorgen.measure.lab.safety import RunDevices
 from sensorgen.measure.log import Log
 from sensorgen.measure.virtual import mechanics
-from sensorgen.measure.virtual.faults import FAULTS, FaultSchedule, Planted
+from sensorgen.measure.virtual.mechanics import FAULTS, FaultSchedule, Planted
 from sensorgen.measure.virtual.specimen import PressedSpecimen, drawn
 
 LIMIT_N = 7.0

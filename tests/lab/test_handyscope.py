@@ -11,8 +11,8 @@ from sensorgen.core.errors import BadInput, NotInstalled, OutOfRange
 from sensorgen.measure.lab.devices import DeviceFault, RealClock, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.handyscope import Bridge, Handyscope, gains, load
 from sensorgen.measure.signal.waveform import TONES_HZ, WEIGHTS, multisine
-from sensorgen.measure.virtual.faults import BY_DEVICE
 from sensorgen.measure.virtual.handyscope import SERIAL, Analyser, PhasorMeter
+from sensorgen.measure.virtual.mechanics import BY_DEVICE
 
 TONES = np.array(TONES_HZ)
 SILENT = Analyser(noise_a=0.0)

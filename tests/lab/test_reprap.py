@@ -12,7 +12,7 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.measure.lab import reprap
 from sensorgen.measure.lab.devices import DeviceFault, RealClock, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.port import HttpPort, SerialPort, SimulatedPort, faults
-from sensorgen.measure.virtual.faults import BY_DEVICE
+from sensorgen.measure.virtual.mechanics import BY_DEVICE
 from sensorgen.measure.virtual.reprap import RepRapFirmware
 
 WAYS = ("serial", "http")

@@ -13,7 +13,7 @@ from sensorgen.measure.lab import meters
 from sensorgen.measure.lab.devices import DeviceFault, RealClock, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.port import SimulatedPort, VisaPort
 from sensorgen.measure.virtual import scpi
-from sensorgen.measure.virtual.faults import BY_DEVICE
+from sensorgen.measure.virtual.mechanics import BY_DEVICE
 
 TONES = np.array([1000.0, 1e5])
 MODELS = {"hp-4284a": meters.HP_4284A, "keysight-e4980a": meters.E4980A}

@@ -11,7 +11,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.measure.lab import smac
 from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock, WrongDevice
 from sensorgen.measure.lab.port import SerialPort, SimulatedPort
-from sensorgen.measure.virtual.faults import BY_DEVICE
+from sensorgen.measure.virtual.mechanics import BY_DEVICE
 from sensorgen.measure.virtual.smac import SmacController
 
 ASKED = b"32 R 0x1000\r32 R 0x11018\r"

@@ -15,6 +15,7 @@ from sensorgen.cli import cli
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.measure.virtual import blank as virtual
+from sensorgen.measure.virtual.blank import bricks
 from sensorgen.measure.virtual.cell import (
     AIR,
     EPSILON_0,
@@ -25,7 +26,6 @@ from sensorgen.measure.virtual.cell import (
     conductance,
     pressed,
 )
-from sensorgen.measure.virtual.section import bricks
 from sensorgen.measure.virtual.specimen import PressedSpecimen
 from sensorgen.scene.scene import Body, Scene, box
 

@@ -10,9 +10,8 @@ import pytest
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.measure.virtual import blank as tables
-from sensorgen.measure.virtual.blank import blank, tracks
+from sensorgen.measure.virtual.blank import blank, raster, tracks
 from sensorgen.measure.virtual.cell import AIR, EPSILON_0, SectionRaster, Solid, capacitance, conductance, pressed
-from sensorgen.measure.virtual.section import raster
 from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, drawn
 
 REFERENCE = Path(__file__).parents[1] / "reference"
@@ -226,7 +225,7 @@ def test_the_conductance_of_a_plate_is_its_shape():
     assert conductance(plate(), 1) == pytest.approx(0.3, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", ["blank", "cell", "section", "specimen", "mechanics", "faults"])
+@pytest.mark.parametrize("name", ["blank", "cell", "specimen", "mechanics"])
 def test_it_is_written_apart_from_what_analyses_it(name):
     import ast
 

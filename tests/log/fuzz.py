@@ -11,9 +11,9 @@ from collections import Counter
 from pathlib import Path
 
 from sensorgen.core.errors import SensorgenError
-from sensorgen.measure.log import Log, exchange, importing, verify
+from sensorgen.measure.log import Log, exchange, verify
 from sensorgen.measure.log.entries import ROWS
-from sensorgen.measure.log.importing import thesis_readings
+from sensorgen.measure.log.exchange import thesis_readings
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "attacks"))
 import damage
@@ -73,7 +73,7 @@ def main(folder, count, seed):
                 if path.suffix == ".db":
                     read_through(path)
                 else:
-                    importing.import_file(log, path, {})
+                    exchange.import_file(log, path, {})
                 seen[f"{name} taken"] += 1
                 before = state(log)
             except SensorgenError as error:

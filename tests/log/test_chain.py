@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Log, chain, logbook, verify
-from sensorgen.measure.log.importing import thesis_readings
+from sensorgen.measure.log.exchange import thesis_readings
 from sensorgen.measure.log.logbook import withdraw
 from sensorgen.measure.log.notes import reading
 from sensorgen.measure.log.prints import prediction
@@ -206,7 +206,7 @@ def test_the_claim_of_an_export_proves_nothing(log, tmp_path):
     """As an attacker would: a prediction exported, tuned, dated 2020 and imported again; or a reading dated back."""
     import csv
 
-    from sensorgen.measure.log import Prediction, exchange, importing
+    from sensorgen.measure.log import Prediction, exchange
 
     log.add([reading("23 triX", "650")])
     log.add([prediction("d", "trix", PREDICTED)])
@@ -220,8 +220,8 @@ def test_the_claim_of_an_export_proves_nothing(log, tmp_path):
         writer.writeheader()
         writer.writerows(rows)
     with Log(tmp_path / "new.db", create=True) as new:
-        importing.import_file(new, tmp_path / "out" / "readings.csv", {})
-        importing.import_file(new, table, {})
+        exchange.import_file(new, tmp_path / "out" / "readings.csv", {})
+        exchange.import_file(new, table, {})
         (tuned,) = new.entries(Prediction)
         assert tuned.logged_at > datetime.now(UTC).isoformat()[:10]
         assert tuned.claimed_at.startswith("2020")

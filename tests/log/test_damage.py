@@ -9,7 +9,7 @@ import pytest
 
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.measure.log import Log, files, verify
-from sensorgen.measure.log.importing import thesis_readings
+from sensorgen.measure.log.exchange import thesis_readings
 
 
 @pytest.fixture

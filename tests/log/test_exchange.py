@@ -21,7 +21,6 @@ from sensorgen.measure.log import (
     entries,
     exchange,
     files,
-    importing,
     verify,
 )
 from sensorgen.measure.log.entries import ROWS, DesignRow, Withdrawal
@@ -102,7 +101,7 @@ def test_the_whole_log_comes_back(full, tmp_path):
     rows = exchange.export(full, tmp_path / "out")
     assert rows == sum(map(len, everything(full).values())) == len(REMARKS) + 10
     with Log(tmp_path / "new.db", create=True) as new:
-        done = importing.import_file(new, tmp_path / "out", {})
+        done = exchange.import_file(new, tmp_path / "out", {})
         assert (done.rows, done.new) == (rows, rows)
         assert as_imported(everything(new)) == as_imported(everything(full))
         for kind, rows in everything(full).items():
@@ -112,14 +111,14 @@ def test_the_whole_log_comes_back(full, tmp_path):
         kept = next(new.entries(RawFile))
         assert files.place(new.files, kept).read_bytes() == b"raw" * 99
         assert files.place(new.files, kept).suffix == ".mat"
-        assert importing.import_file(new, tmp_path / "out", {}).new == 0
+        assert exchange.import_file(new, tmp_path / "out", {}).new == 0
 
 
 @pytest.mark.parametrize("form", exchange.FORMATS)
 def test_readings_alone_come_back(full, tmp_path, form):
     exchange.export(full, tmp_path / f"r.{form}")
     with Log(tmp_path / "new.db", create=True) as new:
-        importing.import_file(new, tmp_path / f"r.{form}", {})
+        exchange.import_file(new, tmp_path / f"r.{form}", {})
         alone, both = new.readings(superseded=True), full.readings(superseded=True)
         assert as_imported({0: alone}) == as_imported({0: both})
 
@@ -203,7 +202,7 @@ def test_a_cell_that_the_log_did_not_write_is_refused(full, tmp_path, column, ce
         table.writerows(rows)
     with Log(tmp_path / "new.db", create=True) as new:
         with pytest.raises(BadInput, match=f"bad.csv, row 4, column {column}: .* is not what the log writes there"):
-            importing.import_file(new, tmp_path / "bad.csv", {})
+            exchange.import_file(new, tmp_path / "bad.csv", {})
         assert new.readings() == ()
 
 
@@ -212,7 +211,7 @@ def test_an_export_that_was_tuned_is_refused(full, tmp_path):
     text = (tmp_path / "r.csv").read_text("utf-8")
     (tmp_path / "tuned.csv").write_text(text.replace("0.1", "0.2"), "utf-8")
     with pytest.raises(BadInput, match="has other content in the log"):
-        importing.import_file(full, tmp_path / "tuned.csv", {})
+        exchange.import_file(full, tmp_path / "tuned.csv", {})
 
 
 def test_raw_files_of_an_export_are_checked(full, tmp_path):
@@ -224,22 +223,22 @@ def test_raw_files_of_an_export_are_checked(full, tmp_path):
             if content:
                 file.write_bytes(content)
             with pytest.raises((BadInput, Unwritable), match=r"is not the file of that SHA-256|No such file"):
-                importing.import_file(new, tmp_path / "out", {})
+                exchange.import_file(new, tmp_path / "out", {})
         table = tmp_path / "out" / "raw-files.csv"
         table.write_text(table.read_text("utf-8").replace(file.name, "../../../etc/passwd"), "utf-8")
         with pytest.raises(BadInput, match="is no SHA-256 of a raw file"):
-            importing.import_file(new, tmp_path / "out", {})
+            exchange.import_file(new, tmp_path / "out", {})
         assert all(not rows for rows in everything(new).values())
 
 
 def test_folders_that_are_no_export(full, tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(BadInput, match=r"has no raw-files.csv; expected the folder of an exported log"):
-        importing.import_file(full, tmp_path / "empty", {})
+        exchange.import_file(full, tmp_path / "empty", {})
     exchange.export(full, tmp_path / "out")
     (tmp_path / "out" / "readings.csv").replace(tmp_path / "out" / "batches.csv")
     with pytest.raises(BadInput, match="columns of another table; expected those of batches"):
-        importing.import_file(full, tmp_path / "out", {})
+        exchange.import_file(full, tmp_path / "out", {})
     for place in ("out", "r.xlsx"):
         with pytest.raises(BadInput, match=r"expected a .csv or .parquet file, or a folder that is not there"):
             exchange.export(full, tmp_path / place)

@@ -9,7 +9,7 @@ from sensorgen.analysis.comparison import of_iteration
 from sensorgen.cli.log_command import DEFECTS as CHOICES
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import load, make
-from sensorgen.measure.log import Batch, Log, Print, RawFile, Reading, importing, logbook, notes, prints, sync
+from sensorgen.measure.log import Batch, Log, Print, RawFile, Reading, exchange, logbook, notes, prints, sync
 from sensorgen.measure.log.entries import DEFECTS
 from sensorgen.prediction import bodies
 
@@ -167,7 +167,7 @@ def test_an_export_of_the_first_version_is_read_and_quantities_come_back(run, ow
         writer.writerow(row)
     for source, quantity in (("new", ("Cp", "Cp")), ("old.csv", ())):
         with Log(tmp_path / f"{source}.db", create=True) as other:
-            importing.import_file(other, Path(source), {})
+            exchange.import_file(other, Path(source), {})
             (back,) = other.entries(Reading)
             assert (back.quantity, back.y_ohm) == (quantity, (4500.0,))
 

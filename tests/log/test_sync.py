@@ -12,7 +12,7 @@ import pytest
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import BenchRun, Log, Prediction, Reading, chain, database, files, listing, sync, verify
-from sensorgen.measure.log.importing import thesis_readings
+from sensorgen.measure.log.exchange import thesis_readings
 from sensorgen.measure.log.logbook import withdraw
 from sensorgen.measure.log.notes import reading
 from sensorgen.measure.log.prints import prediction

@@ -8,7 +8,7 @@ import pytest
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.design import specimen_name
 from sensorgen.design.design import Design
-from sensorgen.measure.log import Log, importing, notes
+from sensorgen.measure.log import Log, exchange, notes
 from sensorgen.measure.log.logbook import withdraw
 
 HEAD = "specimen,y,z,remark\n"
@@ -21,7 +21,7 @@ def take(log, tmp_path):
     def call(content, name="t.csv", **columns):
         path = tmp_path / name
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return importing.import_file(log, path, columns)
+        return exchange.import_file(log, path, columns)
 
     return call
 
@@ -122,15 +122,15 @@ def test_columns_that_are_not_there(take):
 
 def test_a_huge_table_is_refused_unread(log, tmp_path, monkeypatch):
     with (tmp_path / "big.csv").open("wb") as file:
-        file.truncate(importing.MOST_BYTES + 1)
+        file.truncate(exchange.MOST_BYTES + 1)
     with pytest.raises(SensorgenError, match="64000001 bytes; expected at most 64000000: split it"):
-        importing.import_file(log, tmp_path / "big.csv", {})
+        exchange.import_file(log, tmp_path / "big.csv", {})
 
 
 @pytest.mark.parametrize("place", ["none.csv", "/dev/zero", "/dev/tty", "none.json", "none.parquet", "none", "a\0b"])
 def test_what_is_no_file(log, tmp_path, place):
     with pytest.raises(SensorgenError, match=r"cannot read|no file|no Parquet file"):
-        importing.import_file(log, tmp_path / place, {})
+        exchange.import_file(log, tmp_path / place, {})
 
 
 def test_a_zip_or_pickle_given_as_anything_is_not_executed(log, tmp_path):
@@ -144,14 +144,14 @@ def test_a_zip_or_pickle_given_as_anything_is_not_executed(log, tmp_path):
         for content in (pickle.dumps(Evil()), (tmp_path / "t.zip").read_bytes()):
             (tmp_path / f"t.{suffix}").write_bytes(content)
             with pytest.raises(SensorgenError):
-                importing.import_file(log, tmp_path / f"t.{suffix}", {})
+                exchange.import_file(log, tmp_path / f"t.{suffix}", {})
     assert not (tmp_path / "pwned").exists()
     assert log.readings() == ()
 
 
 def test_a_table_as_log_and_a_log_as_table(log, path, tmp_path):
     with pytest.raises(SensorgenError, match="is a database; expected a table as CSV"):
-        importing.import_file(log, path, {})
+        exchange.import_file(log, path, {})
     (tmp_path / "t.csv").write_text(HEAD + "x" * 200)
     with pytest.raises(SensorgenError, match="is no SQLite file; expected a log"):
         Log(tmp_path / "t.csv")
@@ -212,7 +212,7 @@ def test_a_design_is_identified_once_however_many_rows_it_has(tmp_path, monkeypa
     path = tmp_path / "many.csv"
     path.write_text("\n".join(["specimen,y,z", *rows]) + "\n")
     with Log(tmp_path / "log.db", create=True) as log:
-        assert importing.import_file(log, path, {}).new == 80
+        assert exchange.import_file(log, path, {}).new == 80
         found = log.readings()
     assert sorted(identified) == ["trix-d0.1", "triy-d0.1"]
     expected = {x: specimen_name.design_of(specimen_name.parse(f"tri{x} .1mm")) for x in "XY"}
@@ -224,6 +224,6 @@ def test_a_fault_in_the_last_row_logs_none_of_those_before(tmp_path):
     path.write_text("\n".join(["specimen,y", *["23 triX,0.6k"] * 300, "23 triX,hello"]) + "\n")
     with Log(tmp_path / "log.db", create=True) as log:
         with pytest.raises(BadInput, match=r"row 302"):
-            importing.import_file(log, path, {})
+            exchange.import_file(log, path, {})
         assert log.head() == (0, "")
-        assert importing.thesis(log).new == 69  # no transaction is left open
+        assert exchange.thesis(log).new == 69  # no transaction is left open

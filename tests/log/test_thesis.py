@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.measure.log.importing import thesis_readings
+from sensorgen.measure.log.exchange import thesis_readings
 
 TABLE = list(csv.DictReader((Path(__file__).parents[1] / "reference" / "table_d1.csv").read_text("utf-8").splitlines()))
 OURS = {  # what the notes say, and the word of ours that says it

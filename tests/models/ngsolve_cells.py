@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from sensorgen.solvers.electrostatics.elements import RATIO
 from sensorgen.solvers.electrostatics.mesh import Cones
+from sensorgen.solvers.electrostatics.plane import RATIO
 
 
 def written_out(mesh: Cones) -> tuple[np.ndarray, list[tuple[int, int, int]], list[int], dict[str, list]]:

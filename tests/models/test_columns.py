@@ -19,9 +19,9 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import rect, reference, tri
 from sensorgen.models import fem2d
 from sensorgen.models.columns import _mean_min, capacitance, why_not_applicable
+from sensorgen.scene.repetition import cell
 from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 from sensorgen.scene.sections import sections
-from sensorgen.scene.unit_cell import cell
 from sensorgen.solvers.electrostatics.triangles import energy as straight
 from sensorgen.solvers.electrostatics.triangles import triangles
 

@@ -13,9 +13,8 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import fem2d, fem3d
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.electrostatics import bounds
-from sensorgen.solvers.electrostatics.elements import SIDES, Cone, RingLayout, condensed, crossed, ring_corners
 from sensorgen.solvers.electrostatics.elimination import Block, least
-from sensorgen.solvers.electrostatics.plane import Plane
+from sensorgen.solvers.electrostatics.plane import SIDES, Cone, Plane, RingLayout, condensed, crossed, ring_corners
 
 
 def close(expected, rel: float):

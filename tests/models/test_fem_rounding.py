@@ -11,9 +11,8 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import columns, fem2d
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.electrostatics import bounds as _fem_bounds
-from sensorgen.solvers.electrostatics.elements import SIDES
 from sensorgen.solvers.electrostatics.mesh import Cones
-from sensorgen.solvers.electrostatics.plane import Field, Plane
+from sensorgen.solvers.electrostatics.plane import SIDES, Field, Plane
 from sensorgen.solvers.electrostatics.triangles import Triangles
 
 AIR_AT_1E4 = {"x60": 1e4, "air": 1.0}

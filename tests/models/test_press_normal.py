@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from sensorgen.design.design import make
+from sensorgen.scene.repetition import slices
 from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 from sensorgen.scene.sections import sections
-from sensorgen.scene.unit_cell import slices
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d

@@ -8,7 +8,7 @@ from sensorgen.models import traxels
 from sensorgen.solvers import network as band
 from sensorgen.solvers import network as links
 from sensorgen.solvers.network import Nodes, StraightLines
-from sensorgen.verification.chart.rectilinear import plate
+from sensorgen.verification.chart.networks import plate
 
 RHO, W, H = 0.2, 0.42e-3, 0.1e-3
 ENDS = (-9e-3, 9e-3)

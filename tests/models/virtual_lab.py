@@ -19,7 +19,7 @@ from sensorgen.analysis.characterise import catalogue
 from sensorgen.analysis.characterise.posterior import Observation
 from sensorgen.models import traxels
 from sensorgen.solvers.network import StraightLines
-from sensorgen.verification.chart.rectilinear import plate as lines_of
+from sensorgen.verification.chart.networks import plate as lines_of
 
 EPS0 = 8.8541878128e-12
 LINE_MM, LAYER_MM = 0.44, 0.1

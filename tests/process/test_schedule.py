@@ -9,7 +9,7 @@ from scipy import stats
 
 from sensorgen.core.document import comma_separated
 from sensorgen.core.errors import OutOfRange
-from sensorgen.measure.signal.schedule import RunPlan, schedule
+from sensorgen.measure.signal.presses import RunPlan, schedule
 
 PLAN = RunPlan(7, 400, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0, repeats=1)
 

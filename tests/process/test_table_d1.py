@@ -6,15 +6,14 @@ from math import nan
 import pytest
 from scipy import stats
 
-from sensorgen.measure.log import Log, importing
-from sensorgen.measure.signal.verdicts import Evidence, expected_from, least, verdict
-from sensorgen.measure.signal.yields import dependence, groups
+from sensorgen.measure.log import Log, exchange
+from sensorgen.measure.signal.verdicts import Evidence, dependence, expected_from, groups, least, verdict
 
 
 @pytest.fixture(scope="module")
 def judged(tmp_path_factory):
     with Log(tmp_path_factory.mktemp("d1") / "log.db", create=True) as log:
-        importing.thesis(log)
+        exchange.thesis(log)
         made = [
             Evidence(f"row {r.source_row}", r.y_ohm, r.z_ohm, nan, r.shape, r.film_mm, remark(r))
             for r in log.readings()
@@ -60,7 +59,7 @@ def test_neither_film_nor_shape_decides_whether_they_are_shorted(judged):
 
 def test_how_hard_they_are_shorted_depends_on_both_and_on_holes(judged):
     """A tenth of R_Y and less: the bridge lies near the contacts, or there are many."""
-    of_23 = {f"row {r.source_row}" for r in importing.thesis_readings() if r.iteration == 23}
+    of_23 = {f"row {r.source_row}" for r in exchange.thesis_readings() if r.iteration == 23}
     hard = {"order": 0.1}
     shape = groups(judged, lambda e: (e.shape,), **hard)
     assert counts(shape) == {("rect",): (5, 26), ("tri",): (18, 33)}

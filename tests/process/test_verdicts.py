@@ -7,8 +7,17 @@ import pytest
 from scipy import stats
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.measure.signal.verdicts import WORDS, Evidence, expected_from, leak_s, least, verdict
-from sensorgen.measure.signal.yields import groups, independence, share
+from sensorgen.measure.signal.verdicts import (
+    WORDS,
+    Evidence,
+    expected_from,
+    groups,
+    independence,
+    leak_s,
+    least,
+    share,
+    verdict,
+)
 from sensorgen.models import line
 
 

@@ -121,7 +121,7 @@ def test_damaged_logs_of_the_rig_end_in_a_word_or_a_log(tmp_path):
 
 def test_files_beyond_what_fits_into_memory_are_not_read(tmp_path, monkeypatch):
     (tmp_path / "long.csv").write_text("time_s,re_ohm_1kHz,im_ohm_1kHz\n0,1,1\n1,1,1\n")
-    monkeypatch.setattr("sensorgen.measure.recording.files.MOST_BYTES", 40)
+    monkeypatch.setattr("sensorgen.measure.recording.MOST_BYTES", 40)
     with pytest.raises(BadInput, match=r"long\.csv.*: 43 bytes; expected at most 40: split it"):
         read_all(tmp_path / "long.csv")
     monkeypatch.setattr(sys.modules["sensorgen.measure.recording.rig"], "MOST_BYTES", 40)

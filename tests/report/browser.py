@@ -87,11 +87,11 @@ class Page:
             "Emulation.setEmulatedMedia", media=media, features=[{"name": "prefers-color-scheme", "value": scheme}]
         )
 
-    def open(self, path):
-        """Open a page, and wait until it says that it has drawn everything."""
+    def open(self, path, query="", ready="document.documentElement?.dataset.drawn === 'yes'"):
+        """Open a page, and wait until it says that it has drawn everything, or is ready."""
         self.events.clear()
-        self.call("Page.navigate", url=path.resolve().as_uri())
-        self.until("document.documentElement?.dataset.drawn === 'yes'")
+        self.call("Page.navigate", url=path.resolve().as_uri() + query)
+        self.until(ready)
 
     def until(self, condition):
         end = time.monotonic() + PATIENCE_S

@@ -7,8 +7,8 @@ import pytest
 
 from sensorgen.analysis.report import report
 from sensorgen.design.specimen_name import design_of, parse
-from sensorgen.measure.log import Log, bench, importing, notes
-from sensorgen.workflows.stored_prediction import predicted_rows
+from sensorgen.measure.log import Log, bench, exchange, notes
+from sensorgen.measure.log.prints import predicted_rows
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -25,7 +25,7 @@ def thesis(tmp_path_factory):
     """The log of Table D.1."""
     path = tmp_path_factory.mktemp("thesis") / "log.db"
     with Log(path, create=True) as log:
-        importing.thesis(log)
+        exchange.thesis(log)
     return path
 
 

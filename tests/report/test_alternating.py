@@ -12,8 +12,8 @@ from sensorgen.analysis.comparison.expected import predicted
 from sensorgen.analysis.report import FORMATS, alternating, report, written
 from sensorgen.design.design import load
 from sensorgen.measure.log import Log, notes, prints
+from sensorgen.measure.log.prints import predicted_rows
 from sensorgen.prediction import bodies
-from sensorgen.workflows.stored_prediction import predicted_rows
 
 PF = 1e-12
 

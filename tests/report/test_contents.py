@@ -470,6 +470,7 @@ def test_a_bad_recording_is_told_and_the_others_are_reported(recorded, tmp_path,
 
     from sensorgen.analysis.comparison import measured
     from sensorgen.measure.log import bench
+    from sensorgen.measure.signal import run
 
     shutil.copy(recorded, tmp_path / "log.db")
     shutil.copytree(f"{recorded}.files", tmp_path / "log.db.files")
@@ -485,14 +486,14 @@ def test_a_bad_recording_is_told_and_the_others_are_reported(recorded, tmp_path,
         said = [row.why for row in table(made, "left_out").rows if "recording 3, 30 triX .1mm, part 3" in row.what]
         assert len(said) == 1
         assert "2 valid samples" in said[0] or "2 readings" in said[0]
-        real, faults = measured.processed, {1: MemoryError(), 2: ZeroDivisionError("by 0"), 3: KeyError("x")}
+        real, faults = run.processed, {1: MemoryError(), 2: ZeroDivisionError("by 0"), 3: KeyError("x")}
 
         def failing(one, *rest):
             if one.source.part:
                 raise faults[one.source.part]
             return real(one, *rest)
 
-        monkeypatch.setattr(measured, "processed", failing)
+        monkeypatch.setattr(run, "processed", failing)
         left_out = []
         assert len(list(measured.runs(log, 30, left_out))) == 2
     assert [why for _, why in left_out] == [

@@ -12,8 +12,8 @@ from sensorgen.analysis.comparison import measured
 from sensorgen.analysis.plots.figure import Axis, Curve, Figure, Panel, thinned
 from sensorgen.analysis.plots.interactive import data, packed
 from sensorgen.analysis.plots.static import files, whole
+from sensorgen.analysis.report import errors, identifiability
 from sensorgen.analysis.report.recordings import compared
-from sensorgen.analysis.report.variants import errors, identifiability
 from sensorgen.cli import cli
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Log

@@ -13,8 +13,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from sensorgen.asprinted import agreement
-from sensorgen.asprinted.beads import beads
-from sensorgen.asprinted.registration import pieces
+from sensorgen.asprinted.beads import beads, pieces
 from sensorgen.core.errors import BadInput
 from sensorgen.export.gcode.check import check_motion
 from sensorgen.export.gcode.motion import executed

@@ -17,7 +17,7 @@ from sensorgen.core import yamlfile
 from sensorgen.design import design
 from sensorgen.export.gcode import motion as paths
 from sensorgen.export.gcode.check import check
-from sensorgen.export.gcode.drags import lift
+from sensorgen.export.gcode.crossings import lift
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.reading import text_of
 from sensorgen.export.slicing import Placed, alone, sliced

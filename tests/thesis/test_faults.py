@@ -21,9 +21,7 @@ from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction.bodies import drawn
 from sensorgen.verification.thesis.checks import _field, inverse, pressed, solution, strips, tables, triangles
-from sensorgen.verification.thesis.items import CHAPTERS, chapter
-from sensorgen.verification.thesis.reproduced import row
-from sensorgen.verification.thesis.verdicts import JUDGED, UNEXPLAINED
+from sensorgen.verification.thesis.items import CHAPTERS, JUDGED, UNEXPLAINED, chapter, row
 
 ITEMS = {(kind, item.number): (name, kind, item) for name in CHAPTERS for kind, item in chapter(name).items()}
 

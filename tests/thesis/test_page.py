@@ -1,16 +1,13 @@
 """The HTML page: whole, safe, without network, and its filters at work in a browser."""
 
 import re
-import subprocess
 from collections import Counter
 from html.parser import HTMLParser
 
 import pytest
 
 from sensorgen.verification import thesis
-from sensorgen.verification.thesis.items import ThesisItem
-from sensorgen.verification.thesis.reproduced import ReproducedItem
-from sensorgen.verification.thesis.verdicts import AGREES, ItemPart, ItemVerdict
+from sensorgen.verification.thesis.items import AGREES, ItemPart, ItemVerdict, ReproducedItem, ThesisItem
 
 VOID = {"meta", "input", "link"}
 
@@ -89,13 +86,9 @@ def test_words_stay_text():
         ("?text=sideways&verdict=differs&nonsense=1", lambda r: r.name() in ("Eq. 3.35", "Eq. 3.49")),
     ],
 )
-def test_filters_in_a_browser(asked, fits, text, rows, program, tmp_path):
+def test_filters_in_a_browser(asked, fits, text, rows, browser, tmp_path):
     file = tmp_path / "thesis.html"
     file.write_text(text, "utf-8")
-    command = [
-        program("chromium", "chromium", "chromium-browser", "google-chrome"), "--headless", "--no-sandbox",
-        "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", file.as_uri() + asked,
-    ]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, encoding="utf-8", timeout=120)
-    shown = {tr["id"] for tr in Page(done.stdout).of("tr") if "data-verdict" in tr and "hidden" not in tr}
+    browser.open(file, asked, "document.readyState === 'complete'")
+    shown = set(browser.run("[...document.querySelectorAll('tr[data-verdict]:not([hidden])')].map(tr => tr.id)"))
     assert shown == {f"{r.kind}-{r.item.number}" for r in rows if fits(r)}

@@ -9,9 +9,7 @@ import pytest
 
 from sensorgen.verification import thesis
 from sensorgen.verification.thesis.checks import press
-from sensorgen.verification.thesis.items import ThesisItem
-from sensorgen.verification.thesis.reproduced import ReproducedItem, row
-from sensorgen.verification.thesis.verdicts import (
+from sensorgen.verification.thesis.items import (
     DIFFERS,
     JUDGED,
     LOST,
@@ -20,7 +18,10 @@ from sensorgen.verification.thesis.verdicts import (
     TRANSCRIBED,
     UNEXPLAINED,
     ItemPart,
+    ReproducedItem,
+    ThesisItem,
     compared,
+    row,
 )
 
 from .conftest import RECT, solved

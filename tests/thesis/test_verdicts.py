@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from sensorgen.verification.thesis import shown
-from sensorgen.verification.thesis.items import ThesisItem
-from sensorgen.verification.thesis.verdicts import (
+from sensorgen.verification.thesis.documents import number, our_values, thesis_values
+from sensorgen.verification.thesis.items import (
     DIFFERS,
     MISPRINT,
     TRANSCRIBED,
     UNEXPLAINED,
     ItemPart,
+    ThesisItem,
     digits,
     judged,
     share,
@@ -73,7 +73,7 @@ def test_a_limit_agrees_with_anything_below():
     assert judged(expected_of(), [part(2.0, limit=True)]).text() == "agrees with the limit"
     assert word(part(0.9, limit=True)) == UNEXPLAINED
     assert word(part(2.0, ours=np.nan, limit=True)) == UNEXPLAINED
-    assert shown.thesis([part(2.0, limit=True)], 1e-6) == ["x: at most 2 m"]
+    assert thesis_values([part(2.0, limit=True)], 1e-6) == ["x: at most 2 m"]
 
 
 def test_what_is_announced_of_many_times_as_much_is_relative():
@@ -128,17 +128,17 @@ def test_shares(off, said):
     ],
 )
 def test_numbers_in_words(values, unit, said):
-    assert shown.number(values, unit) == said
+    assert number(values, unit) == said
 
 
 def test_of_many_parts_those_that_differ_are_shown():
     many = [part(1.0, name=f"p{k}") for k in range(9)] + [part(2.0, corrected=1.0, name="bad")]
-    assert shown.thesis(many, 1e-6) == ["bad: 2 m; corrected 1 m"]
-    assert shown.ours(many, 1e-6) == ["bad: 1 m", "9 more values that agree"]
-    assert len(shown.ours(many[:9], 1e-6)) == 4
+    assert thesis_values(many, 1e-6) == ["bad: 2 m; corrected 1 m"]
+    assert our_values(many, 1e-6) == ["bad: 1 m", "9 more values that agree"]
+    assert len(our_values(many[:9], 1e-6)) == 4
 
 
 def test_what_rounding_leaves_is_nothing_beside_ours():
-    assert shown.thesis([part(3e-13, ours=1.9)], 1e-6) == ["x: 0 m"]
-    assert shown.ours([part(0.0, ours=2e-16j, scale=1.0)], 1e-6) == ["x: 0 m"]
-    assert shown.thesis([part(3e-8, ours=1.9)], 1e-6) == ["x: 30 nm"]
+    assert thesis_values([part(3e-13, ours=1.9)], 1e-6) == ["x: 0 m"]
+    assert our_values([part(0.0, ours=2e-16j, scale=1.0)], 1e-6) == ["x: 0 m"]
+    assert thesis_values([part(3e-8, ours=1.9)], 1e-6) == ["x: 30 nm"]

@@ -18,9 +18,8 @@ import numpy as np
 import shapely
 
 from sensorgen.analysis.plots.figure import ORANGE, Axis, Curve, Figure, Map, Panel
-from sensorgen.asprinted.beads import beads
+from sensorgen.asprinted.beads import beads, placed
 from sensorgen.asprinted.pinholes import CoveredFilm, Pinholes, draws, films, opened, pinholes, through
-from sensorgen.asprinted.registration import placed
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput
@@ -30,7 +29,7 @@ from sensorgen.design.specimen_name import QUALITIES
 from sensorgen.export.gcode.reading import Source
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.entries import Reading
-from sensorgen.measure.log.importing import thesis_readings
+from sensorgen.measure.log.exchange import thesis_readings
 from sensorgen.measure.signal.verdicts import ORDER
 
 CREDIBLE = 0.9  # share of the posterior inside the interval

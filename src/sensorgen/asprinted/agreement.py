@@ -4,15 +4,15 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from itertools import groupby, zip_longest
+from itertools import groupby
 
 import numpy as np
 import shapely
 
 from sensorgen.asprinted import ledger, nozzle
-from sensorgen.asprinted.beads import Beads, beads
-from sensorgen.asprinted.registration import connected, pieces
+from sensorgen.asprinted.beads import Beads, beads, connected, pieces
 from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.core.findings import runs
 from sensorgen.design.design import Design
 from sensorgen.design.printer import PRIME_MM3
 from sensorgen.export.gcode.motion import NOT_MODEL, Paths
@@ -70,7 +70,7 @@ def check_motion(design: Design, motion: Motion) -> list[GcodeFinding]:
     Raises
     ------
     BadInput
-        It does not print this design; see :func:`sensorgen.asprinted.registration.pieces`.
+        It does not print this design; see :func:`sensorgen.asprinted.beads.pieces`.
     """
     places, found = pieces(design, motion), list[GcodeFinding]()
     for number, place in enumerate(places, 1):
@@ -160,8 +160,7 @@ def _missing(design: Design, paths: Paths, rows: Mask, near: Whole, tops: Real) 
             "its parts are narrower than a line, and some walls leave them out: look at the layer",
         ),
     ):
-        for _, group in groupby(enumerate(np.flatnonzero(absent).tolist()), key=lambda pair: pair[1] - pair[0]):
-            layers = [layer for _, layer in group]
+        for layers in runs(np.flatnonzero(absent).tolist(), int):
             after = paths.number[rows & (near < layers[0])]
             which = f"layer {layers[0] + 1}" + (f" to {layers[-1] + 1}" if len(layers) > 1 else "")
             what = f"nothing of {design.name} is printed up to Z {tops[layers[-1]]:g} mm"
@@ -181,10 +180,10 @@ def _shifts(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Ite
     size, beyond = np.array(design.printed.size_mm[:2]), design.machine.line_mm() / 4
     both = np.stack([lines.start_mm, lines.end_mm])
     own = ((both > -beyond) & (both < size + beyond)).all((0, 2))  # others run on into what touches the piece, as a tab
+    names = ledger.bodies_by_tool(design)
     for tool in np.unique(lines.tool[own]).tolist():
-        mine = [body.name for body in design.printed.bodies if design.tool(body.material) == tool]
         rows = own & (lines.tool == tool)
-        plan = [layers[k].region(name) for k in np.unique(lines.layer[rows]).tolist() for name in mine]
+        plan = [layers[k].region(name) for k in np.unique(lines.layer[rows]).tolist() for name in names[tool]]
         x0, y0, x1, y1 = shapely.total_bounds(plan)
         ends = np.concatenate([lines.start_mm[rows], lines.end_mm[rows]])
         shift = (ends.min(0) + ends.max(0)) / 2 - [(x0 + x1) / 2, (y0 + y1) / 2]
@@ -223,9 +222,9 @@ def _purged(design: Design, paths: Paths, changes: Sequence[ToolChange], piece: 
     """Between taking a tool and its first line of the piece, it fills its nozzle elsewhere."""
     volume = paths.volume_mm3(design.machine.filament_mm)
     missing: dict[int, list[tuple[int, float]]] = {}
-    taken = [change for k, change in enumerate(changes) if k == 0 or change.tool != changes[k - 1].tool]
-    for change, after in zip_longest(taken, taken[1:]):
-        end = math.inf if after is None else after.number
+    taken = [next(same) for _, same in groupby(changes, key=lambda change: change.tool)]
+    ends = [*(change.number for change in taken[1:]), math.inf]
+    for change, end in zip(taken, ends, strict=True):
         rows = np.flatnonzero((paths.number > change.number) & (paths.number < end))
         own = rows[piece[rows]]
         if not len(own) or change.macro or change.tool == NO_TOOL:  # a macro that takes a tool primes it

@@ -5,10 +5,11 @@ rectangle, with a share of each of its points to the four nearest cells. Limits 
 and 2.9 and CuraEngine 4.13 and 5.0 for all shapes (bench/results/ledger.md).
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
-from itertools import chain, groupby
+from itertools import groupby
 
 import numpy as np
 import shapely
@@ -16,6 +17,7 @@ import shapely
 from sensorgen.asprinted.beads import Beads
 from sensorgen.checks import estimate
 from sensorgen.core.arrays import Mask, Real
+from sensorgen.core.findings import runs
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.results import GcodeFinding
 from sensorgen.scene.layers import LayerRegions, Region, drawn, narrow_mm, parts
@@ -116,24 +118,29 @@ def check(design: Design, lines: Beads) -> Iterator[GcodeFinding]:
 
 def rasters(design: Design, lines: Beads, around: Sequence[Sequence[LayerRegions]]) -> Iterator[LayerRaster]:
     """Layers of a piece as rasters, from the bed up; ``around`` is the drawing at and near mid-height."""
-    scene = design.printed
-    shape = tuple(int(np.ceil(size / PITCH_MM)) + 2 * _MARGIN for size in scene.size_mm[:2])
-    names: dict[int, list[str]] = {}
-    for body in scene.bodies:
-        names.setdefault(design.tool(body.material), []).append(body.name)
-    line, before = design.machine.line_mm(), dict[tuple[Region, ...], Real]()  # of the layer before, often the same
+    shape = tuple(int(np.ceil(size / PITCH_MM)) + 2 * _MARGIN for size in design.printed.size_mm[:2])
+    names = bodies_by_tool(design)
+    line = design.machine.line_mm()
+    cover = lru_cache(4 * len(around) * len(names))(_cover)  # of this layer and the one before, often the same
     for k, layer in enumerate(around[0]):
-        here, known = lines.of(lines.layer == k), dict[tuple[Region, ...], Real]()
-        ways = {tool: dict.fromkeys(_ways([each[k] for each in around], mine, line)) for tool, mine in names.items()}
-        for way in chain.from_iterable(ways.values()):
-            known[way] = before[way] if way in before else _cover(way, shape)
-        before = known
+        here, sampled_here = lines.of(lines.layer == k), [each[k] for each in around]
+        shown = {
+            tool: tuple(cover(way, shape) for way in dict.fromkeys(_ways(sampled_here, mine, line)))
+            for tool, mine in names.items()
+        }
         printed = {tool: deposit(here.of(here.tool == tool), shape) for tool in names if (here.tool == tool).any()}
         total: Real = sum(printed.values(), np.zeros(shape, np.float32))
-        shown = {tool: tuple(known[way] for way in some) for tool, some in ways.items()}
         several = any(len(parts(region)) > 1 for region in layer.regions.values())
         smoothed = _mean(total, _WINDOW * line)
         yield LayerRaster(k, here, printed, total, smoothed, shown, bool(layer.along) and several)
+
+
+def bodies_by_tool(design: Design) -> dict[int, list[str]]:
+    """Names of the bodies that each tool prints."""
+    names: dict[int, list[str]] = defaultdict(list)
+    for body in design.printed.bodies:
+        names[design.tool(body.material)].append(body.name)
+    return names
 
 
 def _ways(around: Sequence[LayerRegions], names: Sequence[str], line_mm: float) -> Iterator[tuple[Region, ...]]:
@@ -390,8 +397,7 @@ def _merged(faults: Iterable[Disagreement]) -> Iterator[GcodeFinding]:
     """One finding for the same fault in neighbouring layers, with the worst of them."""
     order = sorted(faults, key=lambda fault: (fault.rule, fault.subject, fault.layer))
     for (rule, _), same in groupby(order, lambda fault: (fault.rule, fault.subject)):
-        for _, run in groupby(enumerate(same), key=lambda pair: pair[1].layer - pair[0]):
-            some = [fault for _, fault in run]
+        for some in runs(same, lambda fault: fault.layer):
             worst = max(some, key=lambda fault: fault.amount)
             first, last, (x, y) = some[0].layer + 1, some[-1].layer + 1, worst.at_mm
             where = f"in layer {first}" if first == last else f"in layers {first} to {last}"

@@ -10,14 +10,20 @@ from typing import Annotated
 import numpy as np
 import shapely
 
-from sensorgen.asprinted.beads import Beads, beads
-from sensorgen.asprinted.registration import placed
+from sensorgen.asprinted.beads import Beads, beads, placed
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import Design
-from sensorgen.export.gcode.crossings import CONTACT_MM, PrintedLines, crossings, printed_lines
-from sensorgen.export.gcode.drags import habits, retracted, summed
+from sensorgen.export.gcode.crossings import (
+    CONTACT_MM,
+    PrintedLines,
+    crossings,
+    habits,
+    printed_lines,
+    retracted,
+    summed,
+)
 from sensorgen.export.gcode.motion import Numbering, follow, tools_of
 from sensorgen.export.gcode.moves import Motion, seconds
 from sensorgen.export.gcode.reading import Source, text_of

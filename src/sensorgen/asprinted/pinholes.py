@@ -98,23 +98,22 @@ class Pinholes:
 def films(design: Design, lines: Beads) -> list[CoveredFilm]:
     """The films of a print: runs of layers that dielectrics cover, with electrodes of other terminals beyond them."""
     scene = design.printed
-    terminal = np.array([body.terminal for body in scene.bodies])
-    names = [body.name for body in scene.bodies if not body.terminal]
+    metal = np.array([bool(body.terminal) for body in scene.bodies])[lines.body]
     plates = drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))
     plan = scene.size_mm[0] * scene.size_mm[1]
-    whole = [sum(layer.region(name).area for name in names) > _WHOLE * plan for layer in plates]
+    dielectrics = [body.name for body in scene.bodies if not body.terminal]
+    whole = [sum(layer.region(name).area for name in dielectrics) > _WHOLE * plan for layer in plates]
+    lowest, highest = lines.layer[metal].min(initial=len(plates)), lines.layer[metal].max(initial=-1)
     runs = []
     for run in np.split(np.arange(len(plates)), np.flatnonzero(np.diff(whole)) + 1):
         layers = run.tolist()
-        below = set(terminal[lines.body[lines.layer < layers[0]]].tolist()) - {""}
-        above = set(terminal[lines.body[lines.layer > layers[-1]]].tolist()) - {""}
-        if not whole[layers[0]] or not below or not above:
+        if not whole[layers[0]] or not lowest < layers[0] <= layers[-1] < highest:
             continue
-        own = [lines.of((lines.layer == k) & (terminal[lines.body] == "")) for k in layers]
+        own = [lines.of((lines.layer == k) & ~metal) for k in layers]
         margin = design.machine.line_mm() / 2
         inside = shapely.box(margin, margin, scene.size_mm[0] - margin, scene.size_mm[1] - margin)
         span = plates[layers[0]].bottom_mm, plates[layers[-1]].top_mm
-        runs.append(CoveredFilm(inside, tuple(k + 1 for k in layers), span, tuple(own)))
+        runs.append(CoveredFilm(inside, tuple(range(layers[0] + 1, layers[-1] + 2)), span, tuple(own)))
     return runs
 
 
@@ -201,18 +200,21 @@ def _row(film: CoveredFilm, width: float) -> OpenPlaces:
     )  # fmt: skip
 
 
+# Severity, head and advice of a finding about a film of one layer, and of more
+_SINGLE = "warning", "one layer: ", "make the film two layers or more: the lines of each cross the slits of the other"
+_SEVERAL = "info", "", "one layer more, or more overlap of infill and walls"
+
+
 def findings(pinholes: Pinholes) -> Iterator[Finding]:
     """Rule 10: a film of one layer, and a film that its lines leave open, with place and figures."""
     for row in pinholes.rows:
         if row.width < 1 or not (row.layers == 1 or row.holes):
             continue
+        severity, head, advice = _SINGLE if row.layers == 1 else _SEVERAL
         edge = f", {row.edge_percent:.0f} % of them within {_EDGE_MM:g} mm of the edge" if row.holes else ""
         holes = f"{row.holes} through-holes between its round lines, {row.through_percent:.2g} % of its area{edge}"
         yield Finding(
-            "10-film", "warning" if row.layers == 1 else "info", f"film, {row.film}",
-            f"{'one layer: ' if row.layers == 1 else ''}{holes}",
-            "make the film two layers or more: the lines of each cross the slits of the other" if row.layers == 1
-            else "one layer more, or more overlap of infill and walls",
+            "10-film", severity, f"film, {row.film}", f"{head}{holes}", advice,
             place_mm=None if row.x_mm is None or row.y_mm is None else (row.x_mm, row.y_mm, float(row.film.split()[0])),
             count=max(row.holes, 1),
         )  # fmt: skip

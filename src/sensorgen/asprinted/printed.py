@@ -36,11 +36,10 @@ from shapely.affinity import translate
 
 from sensorgen.core.arrays import Real
 from sensorgen.scene.layers import Region, cleaned, parts
-from sensorgen.scene.repetition import repeat
+from sensorgen.scene.repetition import Band, Slice, affordable, repeat
 from sensorgen.scene.scene import SLIVER_MM, rounded
 from sensorgen.scene.sections import square_to
 from sensorgen.scene.slabs import is_open
-from sensorgen.scene.unit_cell import Band, Slice, affordable
 
 ROUNDED_MM = 2e-3  # edges nearer than this are one: G-code has three decimals
 

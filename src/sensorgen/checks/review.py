@@ -17,7 +17,7 @@ from sensorgen.scene.scene import Scene
 
 Step = Callable[[str], None]
 STEPS = ("meshes", "checks", "validity")
-LOST = "7-printed"
+LOST, GCODE = "7-printed", "13-gcode"  # rules of what the print loses, and of the check of its file
 _WIDENED = ("2-printed-gap", "5-width", LOST)  # rules that larger widths or a longer period satisfy
 
 

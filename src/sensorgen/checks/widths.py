@@ -11,15 +11,16 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import compress, groupby, pairwise
+from itertools import compress, pairwise
 from math import inf
+from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Mask
-from sensorgen.core.findings import Finding
+from sensorgen.core.findings import Finding, runs
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.scene.layers import Region, are_boxes, drawn, is_rectilinear, narrow_mm, region_at
 from sensorgen.scene.scene import Body, Point, Scene
@@ -196,9 +197,7 @@ def _tapers(here: Sequence[Stretch], body: Body, layer: int, slices: Slices) -> 
 def _findings(rule: str, body: Body, narrow: Sequence[_Narrow]) -> Iterator[Finding]:
     """One finding for a band in neighbouring layers."""
     for band in dict.fromkeys(each.band for each in narrow):
-        numbered = list(enumerate(each for each in narrow if each.band == band))
-        for _, group in groupby(numbered, key=lambda pair: pair[1].layer - pair[0]):
-            run = [each for _, each in group]
+        for run in runs((each for each in narrow if each.band == band), lambda each: each.layer):
             worst = min(run, key=lambda each: each.stretches[0].width_mm)
             least, most = worst.stretches[0].width_mm, max(each.stretches[-1].width_mm for each in run)
             ends = [_below(width, band.upto_mm) for width in (least, most)]
@@ -222,13 +221,8 @@ def stretches(region: Region, limit_mm: float, *, gaps: bool = False) -> list[St
     Rectilinear regions are also looked at from the ends of their edges, where other widths may face them.
     """
     polygons = shapely.get_parts(region)
-    low, high = shapely.bounds(polygons).reshape(-1, 2, 2).swapaxes(0, 1)
-    boxes, far = are_boxes(polygons), limit_mm + 2 * TOUCH_MM
-    if gaps:  # boxes near no other part, and boxes that are wide, have none
-        near = shapely.STRtree(polygons).query(shapely.box(*(low - far).T, *(high + far).T))
-        here = ~boxes | np.isin(np.arange(len(boxes)), near[0][near[0] != near[1]])
-    else:
-        here = ~boxes | ((high - low).min(axis=1, initial=np.inf) <= far)
+    boxes = are_boxes(polygons)
+    here = ~boxes | _narrow_boxes(polygons, limit_mm + 2 * TOUCH_MM, gaps=gaps)
     if not here.any():
         return []
     # Start and end of every edge, the region on its right
@@ -253,6 +247,15 @@ def stretches(region: Region, limit_mm: float, *, gaps: bool = False) -> list[St
             if share == 0.5 or width not in known:
                 by_place.setdefault((width, *at), Stretch(width, (x, y), tuple(out)))
     return sorted(by_place.values(), key=lambda s: (s.width_mm, abs(s.way[1]), s.middle_mm))
+
+
+def _narrow_boxes(boxes: NDArray[Any], upto_mm: float, *, gaps: bool) -> Mask:
+    """Mask of the boxes whose shorter side is up to a width; or, with ``gaps``, which are so near to another part."""
+    low, high = shapely.bounds(boxes).reshape(-1, 2, 2).swapaxes(0, 1)
+    if not gaps:
+        return np.asarray((high - low).min(axis=1, initial=np.inf) <= upto_mm)
+    here, there = shapely.STRtree(boxes).query(shapely.box(*(low - upto_mm).T, *(high + upto_mm).T))
+    return np.isin(np.arange(len(boxes)), here[here != there])
 
 
 def _across(

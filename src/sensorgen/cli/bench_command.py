@@ -174,7 +174,7 @@ def _plan(
         Draw the plan.
     """
     from sensorgen.core import files
-    from sensorgen.measure.signal.schedule import RunPlan, schedule
+    from sensorgen.measure.signal.presses import RunPlan, schedule
 
     if len(force_n) != 2:
         raise BadInput(f"--force: {len(force_n)} values; expected the least and the largest, as in 0,6N")

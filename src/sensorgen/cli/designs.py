@@ -32,8 +32,7 @@ from sensorgen.core import units
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.options import Option
 from sensorgen.design import shapes
-from sensorgen.design.walls import WALLS
-from sensorgen.export.slicers import SLICERS
+from sensorgen.design.walls import SLICERS, WALLS
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
@@ -41,7 +40,7 @@ if TYPE_CHECKING:
     from sensorgen.design.design import Design
     from sensorgen.design.shape_files import Shape
     from sensorgen.prediction.slices import PrintReview
-    from sensorgen.workflows.compensation import Adjustment
+    from sensorgen.workflows.trial import Adjustment
 
 Data = dict[str, Any]
 Parts = Callable[["Design", Data], "Sequence[Design]"]

@@ -125,7 +125,7 @@ def fit_command(
     from sensorgen.analysis.fit import HELD_BACK, STEPS, fit
     from sensorgen.analysis.fit.estimates import text
     from sensorgen.core import files
-    from sensorgen.design.materials import own
+    from sensorgen.design.materials import source_path
 
     if bool(specimens) + (iteration is not None) + thesis != 1:
         raise BadInput("expected either specimens, as in 'sensorgen fit S1 S2', --iteration or --thesis")
@@ -134,7 +134,7 @@ def fit_command(
     with _thesis() if thesis else log.opened() as rows, render.progress(STEPS) as step:
         values = fit(rows, which, seed, body, step, pressed, specimens=specimens, held_share=share)
     if values.values and not dry_run:
-        path = output or own.path(values.source)
+        path = output or source_path(values.source)
         files.replace(path, text(values).encode())
         values = replace(values, file=str(path))
     render.deliver(values)
@@ -145,10 +145,10 @@ def fit_command(
 @contextmanager
 def _thesis() -> "Iterator[Log]":
     """A log of Table D.1 alone that is not kept."""
-    from sensorgen.measure.log import Log, importing
+    from sensorgen.measure.log import Log, exchange
 
     with TemporaryDirectory() as folder, Log(Path(folder) / "log.db", create=True) as log:
-        importing.thesis(log)
+        exchange.thesis(log)
         yield log
 
 

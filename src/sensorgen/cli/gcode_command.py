@@ -108,9 +108,9 @@ def _drags(subject: Subject) -> "Documented":
         from sensorgen.asprinted import nozzle
 
         return nozzle.drags(drawn, subject.file)
-    from sensorgen.export.gcode import drags
+    from sensorgen.export.gcode import crossings
 
-    return drags.drags(subject.file, machine)
+    return crossings.drags(subject.file, machine)
 
 
 @of_function(

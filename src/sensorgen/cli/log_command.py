@@ -286,9 +286,9 @@ def _log_reading(
 
 def _predict_ahead(log: "Log", specimen: str) -> None:
     """Log what is expected before the specimen is measured; beside JSON, which has the measurement alone."""
-    from sensorgen.workflows import stored_prediction
+    from sensorgen.measure.log import prints
 
-    for row in stored_prediction.predict(log, specimen):
+    for row in prints.predict(log, specimen):
         render.say(f"logged prediction {row.number} of {specimen}", err=bool(render.form()))
 
 
@@ -367,7 +367,7 @@ def _import(
     columns, --column : OURS=THEIRS
         Which column is which, as y='Resistance in Y': specimen, y, z, remark, baked, measured_at.
     """
-    from sensorgen.measure.log import importing
+    from sensorgen.measure.log import exchange
 
     if thesis == bool(path):
         raise BadInput(f"{'both' if path else 'neither'} of FILE and --thesis given; expected one of them")
@@ -376,13 +376,13 @@ def _import(
     named = dict(pairs(columns, "--column"))
     with file.opened(create=True) as log:
         if path is None:
-            rows = importing.thesis(log)
+            rows = exchange.thesis(log)
         elif lcr.specimen:
-            rows = importing.lcr_export(
+            rows = exchange.lcr_export(
                 log, path, lcr.specimen, baked=lcr.baked, instrument=lcr.instrument, remark=lcr.remark
             )
         else:
-            rows = importing.import_file(log, path, named)
+            rows = exchange.import_file(log, path, named)
         render.deliver(rows, before=[f"import into {log.path}"])
 
 
@@ -415,7 +415,7 @@ def _bench(specimen: str, lcr_file: Path, rig_file: Path | None = None, *, colum
 def _predict(design: "Design", file: LogFile) -> None:
     """Keep what a design is expected to measure, so that no later comparison can be tuned."""
     from sensorgen.measure.log import Prediction
-    from sensorgen.workflows.stored_prediction import predicted_rows
+    from sensorgen.measure.log.prints import predicted_rows
 
     with file.opened(create=True) as log:
         new = [row for row in log.add(predicted_rows(design)) if isinstance(row, Prediction)]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sensorgen.design.body import BodyOf
     from sensorgen.design.design import Design
     from sensorgen.measure.log import Log
-    from sensorgen.workflows.changes import Advice, Change
+    from sensorgen.workflows.trial import Advice, Change
 
 Strict = Annotated[bool, Option("Treat warnings as errors.")]
 Explain = Annotated[bool, Option("Print which models were used, and their cost and error.")]
@@ -203,7 +203,7 @@ class Advising:
         if not (word.endswith((".yaml", ".yml")) or "/" in word):
             settings = " ".join(_setting(one) for one in change.changes)
             raise BadInput(f"--apply: {word} is no design file; use these options: {settings}")
-        from sensorgen.workflows.changes import apply
+        from sensorgen.workflows.trial import apply
 
         apply(Path(word), design, change)
         changes = ", ".join(one.words() for one in change.changes)

@@ -12,8 +12,8 @@ from sensorgen.cli.designs import Compensate, compensated, of_design
 from sensorgen.cli.options import Advising, Cluster, DesignTip, Jobs, LogFile, NoCache, Out, Strict, TimeLimit
 from sensorgen.core.errors import Unprintable
 from sensorgen.core.options import Option
-from sensorgen.design.walls import rule
-from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
+from sensorgen.design.walls import SLICERS, rule
+from sensorgen.export.slicers import TIME_LIMIT_S
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -53,7 +53,7 @@ def import_command(
     force
         Replace a design of that name.
     """
-    from sensorgen.workflows.importing import reading, writing
+    from sensorgen.workflows.importing import assign, reading, write
 
     if not 1e-4 <= chord <= 1.0:
         raise BadInput(f"--chord {chord:g}: expected 0.0001 to 1 mm")
@@ -61,9 +61,9 @@ def import_command(
     name = name or files[0].stem
     if only_list or assembly.errors or not maps:
         return _listed(assembly, out, None if only_list else out / f"{name}-faults.svg")
-    bodies = writing.assign(assembly, maps, terminals, out)
+    bodies = assign(assembly, maps, terminals, out)
     more = dict(word for word in (("printer", printer), ("quality", quality)) if word[1])
-    design = writing.write(assembly, bodies, name=name, folder=out, more=more, replace_existing=force)
+    design = write(assembly, bodies, name=name, folder=out, more=more, replace_existing=force)
     render.deliver(design)
     return FOUND_ERRORS if design.errors else 0
 
@@ -71,9 +71,9 @@ def import_command(
 def _listed(assembly: Any, folder: Path, drawing: Path | None) -> int:
     """List bodies that are not imported, and raise the reason unless a list is all that was asked for."""
     from sensorgen.core import files
-    from sensorgen.workflows.importing import reading, writing
+    from sensorgen.workflows.importing import BodyListing, reading
 
-    listed = writing.BodyListing.of(assembly, folder)
+    listed = BodyListing.of(assembly, folder)
     render.deliver(listed)
     if assembly.errors:
         first, where = assembly.errors[0], "nothing is imported"

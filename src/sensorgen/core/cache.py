@@ -14,24 +14,15 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from sensorgen.core import files as places
 from sensorgen.core import files as store
 from sensorgen.core.errors import Unwritable
 from sensorgen.core.version import __version__
 
 PLACE = "SENSORGEN_CACHE"  # environment variable with another folder
-_SOURCES = (
-    "asprinted",
-    "checks",
-    "design",
-    "export",
-    "models",
-    "prediction",
-    "scene",
-    "solvers",
-    "core/bounds.py",
+_SOURCES = (  # what decides an answer
+    "asprinted", "checks", "design", "export", "models", "prediction", "scene", "solvers", "core/bounds.py",
     "core/units.py",
-)  # what decides an answer
+)  # fmt: skip
 
 JSON = Any  # None, bool, int, float, str, and lists and string-keyed dicts of these
 
@@ -132,7 +123,7 @@ def keep(question: Mapping[str, JSON], answer: JSON) -> None:
 
 def folder() -> Path:
     """Where entries are: the system's place for caches, or what SENSORGEN_CACHE says."""
-    return places.cache(PLACE)
+    return store.cache(PLACE)
 
 
 def _file(question: Mapping[str, JSON]) -> Path:

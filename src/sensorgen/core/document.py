@@ -113,6 +113,10 @@ class Table:
         cells = tuple((value, *row) for value, row in zip(values, self.cells, strict=True))
         return replace(self, columns=(column, *self.columns), cells=cells)
 
+    def words(self) -> Iterator[list[str]]:
+        """Cells as words, row by row."""
+        return ([c.words(v) for c, v in zip(self.columns, row, strict=True)] for row in self.cells)
+
     def filled(self) -> "Table":
         """The table for people: without hidden columns, and those that are empty in every row."""
         shown_columns = [
@@ -233,10 +237,10 @@ def _facts(part: Facts) -> Iterator[str]:
 
 def _aligned(table: Table) -> Iterator[str]:
     """Numbers to the right, words to the left; words of the last column are wrapped."""
-    rows = ([visible(c.words(v)) for v, c in zip(row, table.columns, strict=True)] for row in table.cells)
+    rows = (list(map(visible, words)) for words in table.words())
     worded, lines = _worded(table), [[c.head for c in table.columns], *rows]
     wide = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    before = sum(width + 2 for width in wide[:-1])
+    before = sum(wide[:-1]) + 2 * (len(wide) - 1)
     for line in lines:
         cells = [f"{v:<{w}}" if words else f"{v:>{w}}" for v, w, words in zip(line, wide, worded, strict=True)]
         if not worded[-1]:
@@ -274,8 +278,8 @@ def _markdown_table(table: Table) -> Iterator[str]:
     worded = _worded(table)
     yield f"| {' | '.join(safe(c.head) for c in table.columns)} |"
     yield f"|{'|'.join('---' if words else '---:' for words in worded)}|"
-    for row in table.cells:
-        yield f"| {' | '.join(safe(c.words(v)) for v, c in zip(row, table.columns, strict=True))} |"
+    for words in table.words():
+        yield f"| {' | '.join(map(safe, words))} |"
 
 
 def safe(words: str) -> str:

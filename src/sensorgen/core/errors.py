@@ -66,13 +66,16 @@ class UnknownName(SensorgenError):
     def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
         """Name the nearest of ``known`` to ``given``, and list them all."""
         names = sorted(known)
-        near = nearest(given[:100], names)
-        hint = f"; did you mean '{near}'?" if near else "."
+        hint = f"; did you mean '{near}'?" if (near := nearest(given[:100], names)) else "."
         super().__init__(f"unknown {kind} {given[:100]!r}{hint} Known: {', '.join(names)}")
 
 
 class BadInput(SensorgenError):
     """A file or a word on the command line that cannot be read as what it should be."""
+
+
+class NotTrusted(BadInput):
+    """A shape's file whose content the user has not trusted."""
 
 
 class MissingValue(SensorgenError):

@@ -1,14 +1,16 @@
 """Findings of checks, as data and for people."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from itertools import groupby
+from typing import Literal, TypeVar
 
 from sensorgen.core.document import Column, Facts, Part, Table
 
 SEVERITIES = ("error", "warning", "info")
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
+Item = TypeVar("Item")
 Verdict = Literal["PRINT", "PRINT WITH WARNINGS", "CHANGE"]
 
 
@@ -177,6 +179,16 @@ def grouped(findings: Sequence[Finding]) -> list[Finding]:
 def numbered(findings: Sequence[Finding]) -> dict[Finding, int]:
     """Number of each finding among the sentences of :func:`grouped`, from 1: its number on the drawing."""
     return {f: number for number, alike in enumerate(_by_sentence(findings), 1) for f in alike}
+
+
+def runs(items: Iterable[Item], number: Callable[[Item], int]) -> Iterator[list[Item]]:
+    """Items whose numbers follow each other, as those of neighbouring layers, run by run.
+
+    >>> list(runs([1, 2, 4, 7, 8], int))
+    [[1, 2], [4], [7, 8]]
+    """
+    for _, run in groupby(enumerate(items), key=lambda pair: number(pair[1]) - pair[0]):
+        yield [item for _, item in run]
 
 
 def _by_sentence(findings: Sequence[Finding]) -> Iterable[list[Finding]]:

@@ -14,7 +14,6 @@ from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from sensorgen.core.errors import BadInput, NotInstalled, SensorgenError
-from sensorgen.core.leash import end_with_parent
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
@@ -347,6 +346,8 @@ def _processes(jobs: int) -> Iterator[Sequence[Lane]]:
 def _begin() -> None:
     """End without a word on Ctrl-C, and with the process that works are for."""
     from multiprocessing import parent_process
+
+    from sensorgen.core.leash import end_with_parent
 
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     parent = parent_process()

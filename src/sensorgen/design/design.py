@@ -290,8 +290,7 @@ class Design(Strict):
     @property
     def area_mm2(self) -> float:
         """Area of the sensor in plan [mm2]."""
-        whole = self.params.length_mm * self.params.width_mm
-        return borders.region(self.border).area if self.border else whole
+        return borders.region(self.border).area if self.border else self.params.length_mm * self.params.width_mm
 
     @cached_property
     def unbordered(self) -> "Design":
@@ -559,16 +558,15 @@ def load(path: Path) -> Design:
 
 def make(data: Mapping[str, Any], where: str = "") -> Design:
     """Check a design given as plain data; ``where`` names its file in errors."""
+    folder = Path(where).parent
     try:
         if isinstance(data, Mapping) and "shape" not in data:
-            raise BadInput(f"shape is missing; expected {', '.join(packs.names('shapes', Path(where).parent))}")
-        design = checked(Design, with_own_files(dict(data), Path(where).parent) if isinstance(data, Mapping) else data)
-        if design.shape == imported.SHAPE or design.geometry or design.bodies:
-            design = _imported(design)
+            raise BadInput(f"shape is missing; expected {', '.join(packs.names('shapes', folder))}")
+        design = _imported(checked(Design, with_own_files(dict(data), folder) if isinstance(data, Mapping) else data))
         _refuse_cell(design)
         _check_names(design)
         if "own" not in data and design.own.keys() & {"printers"}:  # a record needs no materials that it does not use
-            design.machine.check_tools(Path(where).parent)
+            design.machine.check_tools(folder)
     except SensorgenError as error:
         raise error.within(where) from None
     return design if design.name else design.model_copy(update={"name": name_of(design)})
@@ -590,7 +588,9 @@ def _one_dielectric(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _imported(design: Design) -> Design:
-    """An imported design, its map checked, with the materials of its parts."""
+    """A design; an imported one with its map checked, and with the materials of its parts."""
+    if design.shape != imported.SHAPE and not (design.geometry or design.bodies):
+        return design
     if design.shape != imported.SHAPE:
         raise BadInput(f"geometry, bodies: {design.shape} is drawn from parameters; expected shape: {imported.SHAPE}")
     imported.check(design.geometry, design.bodies, design.parameters)
@@ -629,14 +629,7 @@ def _check_names(design: Design) -> None:
     """Look up every name that a design uses, so that a wrong one is reported before any work."""
     packs.check_texts(design.own)
     _ = design.params, design.machine, design.layers
-    for part in ("dielectric", *Slots.model_fields):  # whose material may be that of others
-        if getattr(design.materials, part):
-            material, source = design.slot(part)
-            if source and source not in material.sources():
-                raise UnknownName(f"source of {material.name}", source, material.sources() | set(packs.source_names()))
-            if material.conductor != part.endswith("_electrode"):
-                kind = "conducts" if material.conductor else "does not conduct"
-                raise BadInput(f"materials.{part}: {material.name} {kind}")
+    _check_slots(design)
     for name, values in design.material_values.items():
         material_files.check_own(name, values, design.own)
     _one_source_each(design)
@@ -650,6 +643,18 @@ def _check_names(design: Design) -> None:
         if tool not in machine.tool_numbers:
             raise BadInput(f"tools.{name}: {machine.name} has no tool {tool}; it has {list(machine.tool_numbers)}")
     _one_tool_each(design)
+
+
+def _check_slots(design: Design) -> None:
+    """Refuse a source that a part's material does not quote, and a material that does not conduct as it has to."""
+    for part in ("dielectric", *Slots.model_fields):  # whose material may be that of others
+        if getattr(design.materials, part):
+            material, source = design.slot(part)
+            if source and source not in material.sources():
+                raise UnknownName(f"source of {material.name}", source, material.sources() | set(packs.source_names()))
+            if material.conductor != part.endswith("_electrode"):
+                kind = "conducts" if material.conductor else "does not conduct"
+                raise BadInput(f"materials.{part}: {material.name} {kind}")
 
 
 def _refuse_cell(design: Design) -> None:
@@ -708,15 +713,7 @@ def name_of(design: Design) -> str:
     >>> name_of(Design(shape="rect", parameters={"along": "yx", "length_mm": 50}, quality="extrafine"))
     'sqyx-d0.2-length50-extrafine'
     """
-    params, default = design.params, Design.model_construct(shape=design.shape)
-    parts, named = [getattr(design.form, "SHORT", design.shape) + str(getattr(params, "along", ""))], {"along"}
-    if hasattr(params, "along"):
-        parts.append(f"d{params.dielectric_mm:.10g}")  # type: ignore[attr-defined]
-        named |= {"dielectric_mm"}
-    for field in dataclasses.fields(design.form.Params):
-        value = getattr(params, field.name)
-        if field.name not in named and value != field.default:
-            parts.append(field.name.removesuffix("_mm").replace("_", "-") + _in_name(value))
+    parts, default = list(_shape_in_name(design)), Design.model_construct(shape=design.shape)
     for given, usual in ((design.quality, default.quality), (design.printer, default.printer)):
         parts.append("" if given == usual else _plain(Path(given).stem))
     if design.orientation != default.orientation:
@@ -728,6 +725,19 @@ def name_of(design: Design) -> str:
         parts.append(_digest(others))
     whole = "-".join(filter(None, parts))
     return whole if len(whole) <= 100 else f"{whole[:90].rstrip('.-_')}-{_digest(whole)}"
+
+
+def _shape_in_name(design: Design) -> Iterator[str]:
+    """Shape and parameters that are not at their defaults, as parts of a name."""
+    params, named = design.params, {"along"}
+    yield getattr(design.form, "SHORT", design.shape) + str(getattr(params, "along", ""))
+    if hasattr(params, "along"):
+        yield f"d{params.dielectric_mm:.10g}"  # type: ignore[attr-defined]
+        named |= {"dielectric_mm"}
+    for field in dataclasses.fields(design.form.Params):
+        value = getattr(params, field.name)
+        if field.name not in named and value != field.default:
+            yield field.name.removesuffix("_mm").replace("_", "-") + _in_name(value)
 
 
 def _in_name(value: float | str) -> str:

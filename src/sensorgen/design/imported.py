@@ -163,7 +163,7 @@ def _frozen(value: Any) -> Any:
 @lru_cache(maxsize=8)
 def params(geometry: str) -> Params:
     """Size of an imported sensor, and the period of its pattern where one cross-section repeats."""
-    from sensorgen.scene.unit_cell import cell
+    from sensorgen.scene.repetition import cell
 
     content = bodies(geometry)
     length, width, height = content.size_mm

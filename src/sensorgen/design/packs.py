@@ -24,7 +24,7 @@ from sensorgen.core.records import Strict, checked
 from sensorgen.core.version import __version__
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
+    from importlib.metadata import Distribution, EntryPoint
 
 PLACE = "SENSORGEN_PACKS"  # environment variable with another folder of the user's packs
 SOURCES = "SENSORGEN_MATERIALS"  # environment variable with another folder of fitted sources
@@ -228,23 +228,25 @@ def _of_package(point: "EntryPoint") -> Pack:
     whose = f"pack {point.name!r} of the installed package {package.partition(' ')[0]!r}"
     if not NAME.fullmatch(point.name) or not all(part.isidentifier() for part in parts):
         raise BadInput(f"{whose}: entry point {point.value!r:.80} names no folder, as in my_package.pack; uninstall it")
-    folder = Path(str(dist.locate_file("/".join(parts)))) if dist else Path(*parts)
-    folder = folder if folder.is_dir() else _importable(parts) or folder
+    folder = _folder(dist, parts)
     if not folder.is_dir():
         raise BadInput(f"{whose}: there is no folder {'/'.join(parts)!r} in it; repair or uninstall it")
     return Pack(point.name, "installed", folder, package)
 
 
-def _importable(parts: Sequence[str]) -> Path | None:
-    """Folder of a part of a package, which is not imported; None where there is no such package."""
+def _folder(dist: "Distribution | None", parts: Sequence[str]) -> Path:
+    """Folder of a part of an installed package, which is not imported; it need not be there."""
     from importlib.util import find_spec
 
+    folder = Path(str(dist.locate_file("/".join(parts)))) if dist else Path(*parts)
+    if folder.is_dir():
+        return folder
     try:  # of the first part alone: finding a part of a package would run the package
         spec = find_spec(parts[0])
     except (ImportError, ValueError, AttributeError):
-        return None
+        return folder
     top = list(spec.submodule_search_locations or ()) if spec else []
-    return Path(top[0]).joinpath(*parts[1:]) if top else None
+    return Path(top[0]).joinpath(*parts[1:]) if top else folder
 
 
 def find(kind: Kind, name: str, folder: Path | None = None) -> File:
@@ -275,17 +277,23 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> File:
                 "rename the file"
             )
         return File(kind, name, pack)
-    if is_name(kind, name):
-        for some in ((here,), own, installed):
-            packs = [pack for pack in (some() if callable(some) else some) if os.path.lexists(pack.path(kind, name))]
-            if len(packs) > 1:
-                paths_of = " and ".join(str(pack.path(kind, name)) for pack in packs)
-                raise BadInput(f"{SINGULAR[kind]} {name!r} is in {len(packs)} packs: {paths_of}; rename or remove one")
-            if packs:
-                check_requires(packs[0])
-                return File(kind, name, packs[0])
+    if is_name(kind, name) and (packs := _having(kind, name, here)):
+        if len(packs) > 1:
+            paths_of = " and ".join(str(pack.path(kind, name)) for pack in packs)
+            raise BadInput(f"{SINGULAR[kind]} {name!r} is in {len(packs)} packs: {paths_of}; rename or remove one")
+        check_requires(packs[0])
+        return File(kind, name, packs[0])
     built_in = ["array"] if kind == "shapes" else []  # crossing tracks: the one shape that is no file
     raise unknown(kind, name, (*(file.name for file in files(kind, folder)), *built_in))
+
+
+def _having(kind: Kind, name: str, here: Pack) -> list[Pack]:
+    """Packs with a file of that name: the one beside the design, else those of the user's, else installed ones."""
+
+    def having(packs: Iterable[Pack]) -> list[Pack]:
+        return [pack for pack in packs if os.path.lexists(pack.path(kind, name))]
+
+    return having([here]) or having(own()) or having(installed())
 
 
 def unknown(kind: Kind, name: str, known: Iterable[str]) -> UnknownName:
@@ -355,21 +363,11 @@ def with_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     given = data.get("own", {})
     if not isinstance(given, dict) or not all(isinstance(texts, dict) for texts in given.values()):
         return data
-    texts: dict[Kind, dict[str, Any]] = {kind: dict(given.get(kind, {})) for kind in SINGULAR}
-    complete = dict(data)
-    complete.update(_shape_and_machine(data, texts, folder))
-    complete.update(_cell(data, texts, folder))
-    if isinstance(data.get("materials"), dict):
-        complete["materials"] = {part: _slot(word, texts, folder) for part, word in slots(data["materials"]).items()}
-    if isinstance(data.get("bodies"), dict):
-        complete["bodies"] = {
-            name: body | {"material": _slot(body.get("material"), texts, folder)} if isinstance(body, dict) else body
-            for name, body in data["bodies"].items()
-        }
+    files = _OwnFiles({kind: dict(given.get(kind, {})) for kind in SINGULAR}, folder)
+    complete = data | dict(files.of_parts(data))
     for name in _other_materials(data):
-        if isinstance(name, str) and is_name("materials", name) and name not in shipped_names("materials"):
-            _add(texts, "materials", name, folder)
-    used = {kind: dict(sorted(content.items())) for kind, content in texts.items() if content}
+        files.add_other(name)
+    used = {kind: dict(sorted(content.items())) for kind, content in files.texts.items() if content}
     return complete | ({"own": given | used} if used or "own" in data else {})
 
 
@@ -385,71 +383,96 @@ def slots(materials: Mapping[str, Any]) -> dict[str, Any]:
     return both | {part: word for part, word in materials.items() if part != "electrode"}
 
 
-def _shape_and_machine(
-    data: Mapping[str, Any], texts: dict[Kind, dict[str, Any]], folder: Path
-) -> Iterator[tuple[str, str]]:
-    """Shape, printer and quality, where they are given; a shape's file by its name."""
-    kinds: tuple[tuple[str, Kind], ...] = (("shape", "shapes"), ("printer", "printers"), ("quality", "qualities"))
-    for key, kind in kinds:
-        word = data.get(key)
-        no_file = key == "shape" and ("geometry" in data or word == "array")
-        if isinstance(word, str) and not no_file:
-            yield key, _add(texts, kind, word, folder)
-
-
-def _cell(data: Mapping[str, Any], texts: dict[Kind, dict[str, Any]], folder: Path) -> dict[str, Any]:
-    """Cell of an array, its shape's file by its name."""
-    cell = data.get("cell")
-    if not isinstance(cell, dict) or not isinstance(cell.get("shape"), str):
-        return {}
-    return {"cell": cell | {"shape": _add(texts, "shapes", cell["shape"], folder)}}
-
-
-def _slot(word: Any, texts: dict[Kind, dict[str, Any]], folder: Path) -> Any:
-    """A slot's material and source, a material's file by its name."""
-    if not isinstance(word, str):
-        return word
-    name, mark, source = word.partition("@")
-    if is_name("materials", name) or is_path("materials", name):
-        name = _add(texts, "materials", name, folder)
-    if is_name("sources", source) and source not in texts["sources"]:
-        here = (beside(folder), *own())
-        file = next((pack for pack in here if os.path.lexists(pack.path("sources", source))), None)
-        if file:
-            texts["sources"][source] = File("sources", source, file).text()
-    return f"{name}{mark}{source}"
-
-
-def _other_materials(data: Mapping[str, Any]) -> Iterator[str]:
+def _other_materials(data: Mapping[str, Any]) -> Iterator[Any]:
     """Materials that a design names besides those of its parts."""
-    profile = data.get("profile")
-    tables = [data.get(key) for key in ("tools", "infill", "material_values")]
-    if isinstance(profile, dict):
-        tables += [profile.get(key) for key in ("wall_lines", "line_mm", "infill_angle_deg")]
+    profile, tip = (given if isinstance(given := data.get(key), dict) else {} for key in ("profile", "tip"))
+    tables = [*map(data.get, ("tools", "infill", "material_values"))]
+    tables += map(profile.get, ("wall_lines", "line_mm", "infill_angle_deg"))
     yield from (name for table in tables if isinstance(table, dict) for name in table)
-    if isinstance(data.get("tip"), dict) and data["tip"].get("block", "even") not in ("even", "stiff"):
-        yield data["tip"]["block"]
+    if tip.get("block", "even") not in ("even", "stiff"):
+        yield tip["block"]
 
 
-def _add(texts: dict[Kind, dict[str, Any]], kind: Kind, word: str, folder: Path) -> str:
-    """Keep the text of what a word stands for, unless it ships or is there already; its name in the design."""
-    if word in texts[kind]:
-        return word
-    if not is_path(kind, word):
-        file = find(kind, word, folder)
-        if file.pack.where != "shipped":
-            texts[kind][word] = file.text()
-        return word
-    path = folder / word if (folder / word).exists() else Path(word)
-    text = yamlfile.text(path)
-    if kind in ("printers", "qualities"):  # whose files may be changed copies of those that ship
-        texts[kind][word] = text
-        return word
-    name = path.name.removesuffix(suffix(kind))
-    if not is_name(kind, name):
-        raise BadInput(f"{path}: {name!r} cannot be a {SINGULAR[kind]}'s name; expected small letters, digits and '-'")
-    texts[kind][name] = text
-    return name
+@dataclass(frozen=True)
+class _OwnFiles:
+    """Files that a design needs of packs that do not ship.
+
+    Attributes
+    ----------
+    texts : dict
+        Their content by kind and name; grows.
+    folder : Path
+        Of the design's file.
+    """
+
+    texts: dict[Kind, dict[str, Any]]
+    folder: Path
+
+    def of_parts(self, data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+        """Keys of a design's data whose files are taken over, each with the names of these files in place of paths."""
+        yield from self.shape_and_machine(data)
+        cell, materials, bodies = (data.get(key) for key in ("cell", "materials", "bodies"))
+        if isinstance(cell, dict) and isinstance(cell.get("shape"), str):
+            yield "cell", cell | {"shape": self.add("shapes", cell["shape"])}
+        if isinstance(materials, dict):
+            yield "materials", {part: self.slot(word) for part, word in slots(materials).items()}
+        if isinstance(bodies, dict):
+            yield "bodies", {name: self.body(body) for name, body in bodies.items()}
+
+    def shape_and_machine(self, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Shape, printer and quality, where they are given; a shape's file by its name."""
+        kinds: tuple[tuple[str, Kind], ...] = (("shape", "shapes"), ("printer", "printers"), ("quality", "qualities"))
+        for key, kind in kinds:
+            word = data.get(key)
+            no_file = key == "shape" and ("geometry" in data or word == "array")
+            if isinstance(word, str) and not no_file:
+                yield key, self.add(kind, word)
+
+    def body(self, body: Any) -> Any:
+        """An imported body, its material's file by its name."""
+        return body | {"material": self.slot(body.get("material"))} if isinstance(body, dict) else body
+
+    def slot(self, word: Any) -> Any:
+        """A slot's material and source, a material's file by its name."""
+        if not isinstance(word, str):
+            return word
+        name, mark, source = word.partition("@")
+        if is_name("materials", name) or is_path("materials", name):
+            name = self.add("materials", name)
+        if is_name("sources", source) and source not in self.texts["sources"]:
+            here = (beside(self.folder), *own())
+            file = next((pack for pack in here if os.path.lexists(pack.path("sources", source))), None)
+            if file:
+                self.texts["sources"][source] = File("sources", source, file).text()
+        return f"{name}{mark}{source}"
+
+    def add_other(self, name: Any) -> None:
+        """Keep the text of a material that does not ship; what is no name is left for the validation to refuse."""
+        if isinstance(name, str) and is_name("materials", name) and name not in shipped_names("materials"):
+            self.add("materials", name)
+
+    def add(self, kind: Kind, word: str) -> str:
+        """Keep the text of what a word stands for, unless it ships or is there already; its name in the design."""
+        texts = self.texts[kind]
+        if word in texts:
+            return word
+        if not is_path(kind, word):
+            file = find(kind, word, self.folder)
+            if file.pack.where != "shipped":
+                texts[word] = file.text()
+            return word
+        path = self.folder / word if (self.folder / word).exists() else Path(word)
+        text = yamlfile.text(path)
+        if kind in ("printers", "qualities"):  # whose files may be changed copies of those that ship
+            texts[word] = text
+            return word
+        name = path.name.removesuffix(suffix(kind))
+        if not is_name(kind, name):
+            raise BadInput(
+                f"{path}: {name!r} cannot be a {SINGULAR[kind]}'s name; expected small letters, digits and '-'"
+            )
+        texts[name] = text
+        return name
 
 
 def check_texts(own_texts: Mapping[Kind, Mapping[str, str]]) -> None:

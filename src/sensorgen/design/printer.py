@@ -3,9 +3,9 @@
 import math
 import os
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Literal, Self, TypeVar, cast
 
@@ -78,6 +78,10 @@ class Control(Strict):
     tool_offsets_mm: dict[Annotated[int, Field(strict=False)], Finite] = Field(default={})  # baby steps per tool, M290
     firmware_retraction: bool = False  # G10 and G11 instead of moves of E
     commands: dict[str, Line | None] = Field(default={})  # that a print may send, beside its firmware's; null: not
+
+    def added(self) -> set[str]:
+        """Commands beside the firmware's that a print may send."""
+        return {command for command, words in self.commands.items() if words is not None}
 
 
 class Printer(Strict):
@@ -191,16 +195,11 @@ class Quality(Strict):
 
 
 TRUST = "SENSORGEN_TRUST_PRINTER"  # environment variable: printer files may widen limits, also in processes of ours
-_LIMITS: dict[str, Callable[[Printer], float]] = {
-    "max_nozzle_c": lambda printer: printer.max_nozzle_c,
-    "max_bed_c": lambda printer: printer.max_bed_c,
-    "max_speed_mm_s.xy": lambda printer: printer.max_speed_mm_s.xy,
-    "max_speed_mm_s.z": lambda printer: printer.max_speed_mm_s.z,
-    "max_speed_mm_s.extruder": lambda printer: printer.max_speed_mm_s.extruder,
-    "control.coldest_c": lambda printer: -printer.control.coldest_c,
-    "control.longest_purge_mm": lambda printer: printer.control.longest_purge_mm,
-    "control.longest_retraction_mm": lambda printer: printer.control.longest_retraction_mm,
-}
+_COLDEST = "control.coldest_c"  # wider where it is lower, as no other limit is
+_LIMITS = (
+    "max_nozzle_c", "max_bed_c", "max_speed_mm_s.xy", "max_speed_mm_s.z", "max_speed_mm_s.extruder", _COLDEST,
+    "control.longest_purge_mm", "control.longest_retraction_mm",
+)  # fmt: skip
 _Profile = TypeVar("_Profile", Printer, Quality)
 
 
@@ -240,13 +239,11 @@ def load_printer(name: str, text: str | None = None) -> Printer:
 def _wider(own: Printer) -> str:
     """The first limit of hardware or G-code that is wider than all that ship; "" for none."""
     shipped = [_loaded(Printer, "printers", name, None) for name in printer_names()]
-    for limit, of in _LIMITS.items():
-        if of(own) > max(map(of, shipped)):
-            return f"{limit} {abs(of(own)):g}"
-    allowed = {
-        command for printer in shipped for command, words in printer.control.commands.items() if words is not None
-    }
-    more = sorted(c for c, words in own.control.commands.items() if words is not None and c not in allowed)
+    for limit in _LIMITS:
+        value, *others = map(attrgetter(limit), (own, *shipped))
+        if value < min(others) if limit == _COLDEST else value > max(others):
+            return f"{limit} {value:g}"
+    more = sorted(own.control.added().difference(*(printer.control.added() for printer in shipped)))
     return f"commands {', '.join(more)}" if more else ""
 
 

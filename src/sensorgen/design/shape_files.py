@@ -26,7 +26,7 @@ from pydantic import ValidationError
 from sensorgen.core import cache as answers
 from sensorgen.core import files
 from sensorgen.core.display import harmless
-from sensorgen.core.errors import BadInput, OutOfRange, Unwritable
+from sensorgen.core.errors import BadInput, NotTrusted, OutOfRange, Unwritable
 from sensorgen.core.records import problem
 from sensorgen.design import packs, shape_process
 from sensorgen.scene.polyhedra import Loft, Polyhedron
@@ -58,11 +58,9 @@ class Shape(Protocol):
         """Bodies for parameters and materials."""
 
 
-class NotTrusted(BadInput):
-    """A shape's file whose content the user has not trusted."""
-
-    def __init__(self, name: str, text: str) -> None:
-        super().__init__(
+def _refuse_untrusted(name: str, text: str) -> None:
+    if not is_trusted(text):
+        raise NotTrusted(
             f"{name}.py is not trusted and did not run: a shape is a program; read it, then: sensorgen pack trust "
             f"shapes/{name}.py (its file, or the design's that contains it), and again after each change; SHA-256 "
             f"{digest(text)}"
@@ -79,8 +77,7 @@ def load(name: str, text: str) -> Shape:
     BadInput
         The file is no shape; the message names its line.
     """
-    if not is_trusted(text):
-        raise NotTrusted(name, text)
+    _refuse_untrusted(name, text)
     return _foreign(name, text)
 
 
@@ -216,27 +213,28 @@ def _decoded(data: object) -> Scene:
 
 def _fields(name: str, reply: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
     """Parameters as a shape's file describes them, checked."""
-    parameters: list[tuple[str, type, Any]] = []
     inherited = {f.name for f in dataclasses.fields(Envelope)}
     if missing := inherited - {str(field.get("name")) for field in reply["fields"]}:
         raise BadInput(f"{name}.py: Params has no {sorted(missing)[0]}; expected a dataclass derived from Envelope")
-    for field in reply["fields"]:
-        key, default, about = str(field["name"]), field["default"], dict(field["metadata"])
-        about["help"] = harmless(about["help"]) if isinstance(about.get("help"), str) else ""
-        where = f"{name}.py: parameter {key[:60]}"
-        if not _NAME.fullmatch(key):
-            raise BadInput(f"{where}: expected a name of small letters, digits and '_'")
-        if not about["help"]:
-            raise BadInput(f"{where} has no help; write metadata={{'help': ..., 'range': (low, high)}}")
-        choices = about.get("choices")
-        if choices:
-            if default not in choices or not all(isinstance(each, str) and each.isprintable() for each in choices):
-                raise BadInput(f"{where}: default {default!r:.40} is not among its choices, or one cannot be printed")
-            about["choices"] = tuple(choices)
-        else:
-            default, about["range"] = _in_range(where, default, about)
-        parameters.append((key, str if choices else float, dataclasses.field(default=default, metadata=about)))
-    return parameters
+    return [_parameter(name, field) for field in reply["fields"]]
+
+
+def _parameter(name: str, field: Mapping[str, Any]) -> tuple[str, type, Any]:
+    """Name, type and field of a parameter; raises BadInput."""
+    key, default, about = str(field["name"]), field["default"], dict(field["metadata"])
+    about["help"] = harmless(about["help"]) if isinstance(about.get("help"), str) else ""
+    where = f"{name}.py: parameter {key[:60]}"
+    if not _NAME.fullmatch(key):
+        raise BadInput(f"{where}: expected a name of small letters, digits and '_'")
+    if not about["help"]:
+        raise BadInput(f"{where} has no help; write metadata={{'help': ..., 'range': (low, high)}}")
+    if choices := about.get("choices"):
+        if default not in choices or not all(isinstance(each, str) and each.isprintable() for each in choices):
+            raise BadInput(f"{where}: default {default!r:.40} is not among its choices, or one cannot be printed")
+        about["choices"] = tuple(choices)
+        return key, str, dataclasses.field(default=default, metadata=about)
+    default, about["range"] = _in_range(where, default, about)
+    return key, float, dataclasses.field(default=default, metadata=about)
 
 
 def _in_range(where: str, default: Any, about: Mapping[str, Any]) -> tuple[float, tuple[float, float]]:
@@ -288,8 +286,7 @@ class _ShapeProcess:
     """The process that runs one shape's file."""
 
     def __init__(self, name: str, text: str) -> None:
-        if not is_trusted(text):
-            raise NotTrusted(name, text)
+        _refuse_untrusted(name, text)
         self.name = name
         self._process = subprocess.Popen(  # noqa: S603 - this very program
             [sys.executable, "-I", "-S", "-B", shape_process.__file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE,

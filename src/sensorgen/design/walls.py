@@ -1,4 +1,8 @@
-"""Walls by whose rules a print is estimated: names, and what provenance calls them."""
+"""Slicers that can be run, and walls by whose rules a print is estimated: names, and what provenance calls them."""
+
+SLICERS = ("prusa", "cura")
+TITLES = {"prusa": "PrusaSlicer", "cura": "CuraEngine"}
+PROGRAMS = {"prusa": ("prusa-slicer", "prusa-slicer"), "cura": ("CuraEngine", "cura-engine cura")}  # and its package
 
 _RULES = {"prusa": {"arachne": "arachne", "classic": "classic"}, "cura": {"arachne": "cura-gaps", "classic": "cura"}}
 

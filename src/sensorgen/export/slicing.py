@@ -14,12 +14,13 @@ from sensorgen.core.errors import BadInput, SlicerFailed, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
 from sensorgen.design.printer import tower
+from sensorgen.design.walls import PROGRAMS, SLICERS, TITLES
 from sensorgen.export import threemf
-from sensorgen.export.gcode.drags import Lifted, lift
+from sensorgen.export.gcode.crossings import Lifted, lift
 from sensorgen.export.gcode.motion import Paths, follow, paths_of
 from sensorgen.export.gcode.reading import text_of
 from sensorgen.export.gcode.ready import ready
-from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, cura, prusa, run, versions
+from sensorgen.export.slicers import TIME_LIMIT_S, cura, prusa, run, versions
 from sensorgen.export.slicers.loads import ToolLoad, loads
 from sensorgen.export.slicers.run import Runner, find
 from sensorgen.export.threemf.core import part_of, parts_of

@@ -319,7 +319,7 @@ def of_frames(paths: Sequence[Path], model: ArrayModel, frequency_hz: "float | N
         frames = read(path, (m, n), frequency_hz)
         inverter = at_rest(model, ArrayReadout(frequency_hz=(frames.frequency_hz,)), frames.siemens[frames.rest])
         ratio, _, _ = inverter.planned(missing(frames.siemens))
-        ratio = np.where(inverter.alive, ratio, np.nan).reshape(len(ratio), -1)
+        ratio = np.where(inverter.own, ratio, np.nan).reshape(len(ratio), -1)
         one = session(path, k, area_mm2=model.pitch_area_m2 * 1e6, values=ratio - 1, names=names)
         carried = model.carried(np.nan_to_num(one.pressure_kpa)).reshape(one.pressure_kpa.shape)
         found.append(replace(one, pressure_kpa=np.where(np.isfinite(one.pressure_kpa), carried, np.nan)))

@@ -282,15 +282,22 @@ def _numbers(cells: Sequence[str], columns: Sequence[_Column], where: str) -> It
 
 
 def _readings(rows: Sequence[_Row], columns: Sequence[_Column], path: Path) -> Iterator[AcReading]:
-    degrees = _degrees(rows, columns, path)
-    at = {column.quantity: column for column in columns}["frequency"]
-    for row in rows:
-        frequency, _ = row.pop(at, (math.nan, False))
-        if frequency < 0 or (frequency == 0 and row):
+    for numbers in _by_quantity(rows, columns, path):
+        frequency = numbers.pop("frequency", math.nan)
+        if frequency < 0 or (frequency == 0 and numbers):
             raise BadInput(f"{path}: a frequency of {frequency:g} Hz; expected one above 0")
-        for column, (value, known) in row.items() if frequency > 0 else ():
-            angle = degrees and column.quantity == "phase" and not known
-            yield AcReading(column.quantity, math.radians(value) if angle else value, frequency)
+        if frequency > 0:
+            yield from (AcReading(quantity, value, frequency) for quantity, value in numbers.items())
+
+
+def _by_quantity(rows: Sequence[_Row], columns: Sequence[_Column], path: Path) -> Iterator[dict[str, float]]:
+    """Numbers of each row by their quantity; angles without a unit are in degrees, where that is certain."""
+    degrees = _degrees(rows, columns, path)
+    for row in rows:
+        yield {
+            column.quantity: math.radians(value) if degrees and column.quantity == "phase" and not known else value
+            for column, (value, known) in row.items()
+        }
 
 
 def _degrees(rows: Sequence[_Row], columns: Sequence[_Column], path: Path) -> bool:

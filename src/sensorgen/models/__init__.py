@@ -5,7 +5,7 @@ where they read it.
 """
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Protocol, cast
 
@@ -63,6 +63,15 @@ class CapacitanceModel(Protocol):
             The lower bound lies above the upper one: a fault of the solver.
         """
         ...
+
+
+def refusal(kind: type[Exception], work: Callable[..., object], *given: object) -> str | None:
+    """Message of the error by which a piece of work, as the cell of a scene, is refused; None where it is done."""
+    try:
+        work(*given)
+    except kind as error:
+        return str(error)
+    return None
 
 
 def names() -> tuple[str, ...]:

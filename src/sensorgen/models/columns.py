@@ -37,15 +37,16 @@ def why_not_applicable(scene: Scene) -> str | None:
     if reason := third_conductor(scene):
         return reason
     try:
-        gaps = [_gap(column) for part in overlay_parts(scene) for column in _distinct(part).values()]
+        gaps = _gaps(scene)
     except ValueError as error:
         return str(error)
-    if any(gap is None for gap in gaps):
+    known = [(gap.bottom_mm, gap.top_mm) for gap in gaps if gap is not None]
+    if len(known) < len(gaps):
         return "an electrode does not cover the whole sensor"
-    if min(min(g.thickness_mm()) for g in gaps if g is not None) <= 0:
+    floors, roofs = np.swapaxes(known, 0, 1)
+    if (roofs - floors).min() <= 0:
         return "the electrodes touch: the capacitance grows without bound"
-    floor, roof = max(max(g.bottom_mm) for g in gaps if g), min(min(g.top_mm) for g in gaps if g)
-    if floor >= roof and not _is_one_section(scene):
+    if floors.max() >= roofs.min() and not _is_one_section(scene):
         return "the electrodes reach into each other, and the scene is no single cross-section"
     return None
 
@@ -129,8 +130,9 @@ class _Gap:
     top_mm: tuple[float, float]
     layers: tuple[Layer, ...]
 
-    def thickness_mm(self) -> tuple[float, float]:
-        return self.top_mm[0] - self.bottom_mm[0], self.top_mm[1] - self.bottom_mm[1]
+
+def _gaps(scene: Scene) -> list[_Gap | None]:
+    return [_gap(column) for part in overlay_parts(scene) for column in _distinct(part).values()]
 
 
 def _gap(cell: SectionColumn) -> _Gap | None:

@@ -17,9 +17,9 @@ from sensorgen.core import cache as cached
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
+from sensorgen.scene.repetition import Band, SectionCell, Slice, cell
 from sensorgen.scene.scene import Scene, area_mm2, content
 from sensorgen.scene.sections import ROUNDING_MM, Section, square_to
-from sensorgen.scene.unit_cell import Band, SectionCell, Slice, cell
 
 SOURCE = "Dirichlet's and Thomson's principles for conduction; Rayleigh's cuts where no field is solved"
 COST = 2

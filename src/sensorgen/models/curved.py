@@ -15,6 +15,7 @@ import shapely
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.models import refusal
 from sensorgen.scene.layers import Region
 from sensorgen.scene.repetition import Repeat, halved, repeat
 from sensorgen.scene.scene import SLIVER_MM, Body, Piece, Scene, dielectrics
@@ -39,11 +40,7 @@ def why_not_applicable(scene: Scene) -> str | None:
         return "its bodies are prisms along one axis: solved by the models of those"
     if find_spec("ngsolve") is None:
         return "NGSolve is not installed: pip install 'sensorgen[fem]'"
-    try:
-        cell(scene)
-    except ValueError as error:
-        return str(error)
-    return None
+    return refusal(ValueError, cell, scene)
 
 
 def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:

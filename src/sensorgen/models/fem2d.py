@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.models import refusal
+from sensorgen.scene.repetition import cell
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import Section, sections
-from sensorgen.scene.unit_cell import cell
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.bounds import Fields, Turned, disc, turned
-from sensorgen.solvers.electrostatics.elements import RATIO
 from sensorgen.solvers.electrostatics.elimination import Numbers
 from sensorgen.solvers.electrostatics.mesh import Cones, exponents, graded
-from sensorgen.solvers.electrostatics.plane import Field, Plane
+from sensorgen.solvers.electrostatics.plane import RATIO, Field, Plane
 from sensorgen.solvers.electrostatics.triangles import Triangles, triangles
 
 SOURCE = "Dirichlet's and Thomson's principles; hp finite elements, rings without end at corners"
@@ -39,13 +39,7 @@ _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
 
 def why_not_applicable(scene: Scene) -> str | None:
     """Why the model does not apply to a scene, or None."""
-    if reason := fem.unmirrored(scene):
-        return reason
-    try:
-        _triangles(scene)
-    except ValueError as error:
-        return str(error)
-    return None
+    return fem.unmirrored(scene) or refusal(ValueError, _triangles, scene)
 
 
 def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:

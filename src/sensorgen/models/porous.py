@@ -190,10 +190,9 @@ def _gap(column: SectionColumn) -> tuple[float, float] | None:
     """Heights between the electrodes of a column [mm]; None where one is missing or slanted."""
     low = [one for one in column.layers if one.body.terminal == "bottom"]
     high = [one for one in column.layers if one.body.terminal == "top"]
-    faces = {z for one in low + high for z in (one.bottom_mm, one.top_mm)}
-    if not (low and high) or any(a != b for a, b in faces):
+    if not (low and high) or np.ptp([(one.bottom_mm, one.top_mm) for one in low + high], axis=2).any():
         return None
-    return round(max(one.top_mm[0] for one in low), 9), round(min(one.bottom_mm[0] for one in high), 9)
+    return round(low[-1].top_mm[0], 9), round(high[0].bottom_mm[0], 9)
 
 
 def _inside(layer: Layer, gap: tuple[float, float]) -> bool:

@@ -6,11 +6,15 @@ load reached, volume, penetration of faces, work equal to the energy stored.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from math import inf
+
+import numpy as np
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
+from sensorgen.models import refusal
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.solvers.contact.cell import ContactCell
@@ -87,42 +91,53 @@ def press(
     """
     boundary, fineness = boundary or BoundaryConditions(), fineness or Fineness()
     check(stress_pa, boundary)
-    told, sharp = step or (lambda _: None), bool(pinches(cell))
+    if not pinches(cell):
+        part, run = _solved(cell, solids, stress_pa, boundary, fineness, step)
+        return joined([_with_fields(part, cell, run, permittivity, fineness) if permittivity else part], stress_pa[-1])
     least_pa = min(solid.youngs_modulus_pa for solid in solids.values())
     parts: list[Pressed] = []
-    left, failed = [float(p) for p in stress_pa[1:]], False
-    for factor in _APEX if sharp else _APEX[:1]:
-        sizes, last = replace(fineness, apex_mm=factor * fineness.apex_mm), not sharp or factor == _APEX[-1]
-        folds_pa = _FOLDS * (sizes.apex_mm / _UM) ** _FOLDS_POWER * sizes.growth * least_pa
-        loads = left if last else [p for p in left if p <= folds_pa]
-        if not loads:
-            continue
-        part, run = _solved(cell, solids, [0.0, *loads], boundary, sizes, told)
-        part = part if last else replace(part.first(part.sound_loads()), faults=())
-        reached = len(part.stress_pa) - 1
-        if failed and reached:
-            size = f"triangles of {sizes.apex_mm / _UM:.3g} um at the apex from {loads[0] / 1e3:.4g} kPa on"
-            part = replace(part, doubts=(*part.doubts, f"{size}, because finer ones do not converge"))
-        part = replace(part, apex_m=(sizes.apex_mm * M_PER_MM,) * (reached + 1) if sharp else ())
-        parts.append(_with_fields(part, cell, run, permittivity, sizes) if permittivity else part)
-        left, failed = left[reached:], reached < len(loads)
-        if not left:
-            break
+    left, failed = np.array(stress_pa[1:], float), False
+    for factor in _APEX:
+        sizes = replace(fineness, apex_mm=factor * fineness.apex_mm)
+        folds_pa = inf if factor == _APEX[-1] else _folds_pa(sizes, least_pa)
+        loads = left[left <= folds_pa].tolist()
+        if loads:
+            part, run = _solved(cell, solids, [0.0, *loads], boundary, sizes, step)
+            part = _of_size(part, sizes.apex_mm, finer_failed=failed, largest=folds_pa == inf)
+            parts.append(_with_fields(part, cell, run, permittivity, sizes) if permittivity else part)
+            reached = len(part.stress_pa) - 1
+            left, failed = left[reached:], reached < len(loads)
     return joined(parts, stress_pa[-1])
 
 
+def _folds_pa(sizes: Fineness, least_pa: float) -> float:
+    """Pressure that folds triangles at an apex [Pa]."""
+    return float(_FOLDS * (sizes.apex_mm / _UM) ** _FOLDS_POWER * sizes.growth * least_pa)
+
+
+def _of_size(part: Pressed, apex_mm: float, *, finer_failed: bool, largest: bool) -> Pressed:
+    """A part of a curve with the size of its triangles at the apex, and with a doubt where finer ones failed.
+
+    Of all but the largest, what is not sound is left to larger ones.
+    """
+    part = part if largest else replace(part.first(part.sound_loads()), faults=())
+    part = replace(part, apex_m=(apex_mm * M_PER_MM,) * len(part.stress_pa))
+    if not finer_failed or len(part.stress_pa) == 1:
+        return part
+    size = f"triangles of {apex_mm / _UM:.3g} um at the apex from {part.stress_pa[1] / 1e3:.4g} kPa on"
+    return replace(part, doubts=(*part.doubts, f"{size}, because finer ones do not converge"))
+
+
 def _solved(
-    cell: ContactCell,
-    solids: Mapping[str, Elastic],
-    stress_pa: Sequence[float],
-    boundary: BoundaryConditions,
-    fineness: Fineness,
-    step: Callable[[float], None],
-) -> tuple[Pressed, LoadSteps[TriangleMesh]]:
+    cell: ContactCell, solids: Mapping[str, Elastic], stress_pa: Sequence[float], boundary: BoundaryConditions,
+    fineness: Fineness, step: Callable[[float], None] | None = None,
+) -> tuple[Pressed, LoadSteps[TriangleMesh]]:  # fmt: skip
     mesh = mesh_of(cell, fineness)
     materials = [cell.regions[k - 1].material for k in mesh.region.tolist()]
     longest = _STICKING_STEP if boundary.contact == "stick" else _STEP
-    pressed, run = solve(mesh, [solids[m] for m in materials], stress_pa, boundary, longest, SOURCE, step)
+    pressed, run = solve(
+        mesh, [solids[m] for m in materials], stress_pa, boundary, longest, SOURCE, step or (lambda _: None)
+    )
     if not cell.mirrored:
         remark = "solved as if each period were followed by its mirror image: the cell is not symmetric"
         pressed = replace(pressed, doubts=(remark, *pressed.doubts))
@@ -130,12 +145,9 @@ def _solved(
 
 
 def _with_fields(
-    pressed: Pressed,
-    cell: ContactCell,
-    run: LoadSteps[TriangleMesh],
-    permittivity: Mapping[str, float],
+    pressed: Pressed, cell: ContactCell, run: LoadSteps[TriangleMesh], permittivity: Mapping[str, float],
     fineness: Fineness,
-) -> Pressed:
+) -> Pressed:  # fmt: skip
     """Add the capacitance of the deformed outlines.
 
     Where no gap ends in an apex, the mesh as drawn is carried along until a gap closes: its errors cancel in the rise.
@@ -171,8 +183,4 @@ def _with_fields(
 
 def why_not_applicable(scene: Scene) -> str | None:
     """Why this model does not apply to a scene, or None."""
-    try:
-        cell(scene, None)
-    except BadInput as error:
-        return str(error)
-    return None
+    return refusal(BadInput, cell, scene, None)

@@ -12,6 +12,7 @@ import numpy as np
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
+from sensorgen.models import refusal
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.solvers.contact.bricks import Bricks, bricks_of
@@ -55,11 +56,7 @@ class BrickCounts:
 
 def why_not_applicable(scene: Scene) -> str | None:
     """Why this model does not apply to a scene, or None."""
-    try:
-        cell(scene)
-    except BadInput as error:
-        return str(error)
-    return None
+    return refusal(BadInput, cell, scene)
 
 
 def cell(scene: Scene) -> Bricks:
@@ -126,12 +123,9 @@ def press(
 
 
 def _solved(
-    cut: Bricks,
-    solids: Mapping[str, Elastic],
-    stress_pa: Sequence[float],
-    boundary: BoundaryConditions,
+    cut: Bricks, solids: Mapping[str, Elastic], stress_pa: Sequence[float], boundary: BoundaryConditions,
     step: Callable[[float], None],
-) -> "tuple[Pressed, LoadSteps[BrickMesh]]":
+) -> "tuple[Pressed, LoadSteps[BrickMesh]]":  # fmt: skip
     from sensorgen.solvers.contact.bricks import mesh_of
 
     mesh = mesh_of(cut, cut.fill > 0)

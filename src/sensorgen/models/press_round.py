@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from sensorgen.core.errors import BadInput
-from sensorgen.models import curved, press2d
+from sensorgen.models import curved, press2d, refusal
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness, Pressed
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Piece, Point, Scene
@@ -39,11 +39,7 @@ _WANTED = "an axisymmetric cell is needed"
 
 def why_not_applicable(scene: Scene) -> str | None:
     """Why this model does not apply to a scene, or None."""
-    try:
-        cell(scene)
-    except BadInput as error:
-        return str(error)
-    return None
+    return refusal(BadInput, cell, scene)
 
 
 def press(

@@ -95,58 +95,79 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     first = sum(reach > 2 * width for *_, reach in _RUNGS[:-1])
     failed, reached = None, False
     for factors, order, _ in (*((_SLANTED,) if cell.outer else ()), *_RUNGS[first:]):
-        beside = [factor * cell.gap_mm for factor in (*(_AROUND if cell.air_mm else ()), *factors)]
         try:
-            inner, outer, enclosed = _meshes(cell, layers, beside)
-            most = _OPEN_MB if cell.air_mm else _MOST_MB
-            if outer.memory_mb(order) > most:
-                raise fem.Unsolved(f"{outer.memory_mb(order):.0f} MB; meshes of up to {most:g} MB are solved")
-            energies = solved(inner, outer, order, cell.shares(outer), enclosed=enclosed)
-        except fem.Unsolved as error:
-            failed = error
-            continue
-        except shapely.errors.GEOSException as error:  # outlines that rounding makes invalid
+            step = _step(cell, layers, factors, order)
+        except (fem.Unsolved, shapely.errors.GEOSException) as error:  # or outlines that rounding makes invalid
             failed = fem.Unsolved(str(error))
             continue
-        interval = fem.whole(energies, np.outer(cell.x.shares, cell.y.shares).ravel().tolist())
         reached = True
-        yield fem.FieldStep(order, int(outer.free.sum()), energies.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
-        if interval.width() <= width:
+        yield step
+        if step.interval.width() <= width:
             return
     if failed and not reached:
         raise failed
 
 
-def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> tuple[PrismMesh, PrismMesh, bool]:
-    """The mesh of a cell for the flux, that for the potential, and whether their outlines enclose the cell's.
+def _step(cell: "_Cell", layers: LayerCell, factors: Sequence[float], order: int) -> fem.FieldStep:
+    """One mesh, with lines at some distances from outlines, in electrode gaps."""
+    meshes = _meshes(cell, layers, [factor * cell.gap_mm for factor in (*(_AROUND if cell.air_mm else ()), *factors)])
+    most, outer = _OPEN_MB if cell.air_mm else _MOST_MB, meshes.potential
+    if outer.memory_mb(order) > most:
+        raise fem.Unsolved(f"{outer.memory_mb(order):.0f} MB; meshes of up to {most:g} MB are solved")
+    energies = solved(meshes.flux, outer, order, cell.shares(outer), enclosed=meshes.enclosed)
+    interval = fem.whole(energies, np.outer(cell.x.shares, cell.y.shares).ravel().tolist())
+    return fem.FieldStep(order, int(outer.free.sum()), energies.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
+
+
+@dataclass(frozen=True)
+class _Meshes:
+    """Meshes of a cell for the flux and for the potential, and whether their outlines enclose the cell's."""
+
+    flux: PrismMesh
+    potential: PrismMesh
+    enclosed: bool
+
+
+def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> _Meshes:
+    """Meshes with the outlines of a cell, or where these nearly coincide, with outlines that enclose them.
 
     With air around it, the flux stays in that air, and the potential is constant beyond: a conductor that floats.
     """
+    if not cell.outer:  # with it, no layer has outlines of its own
+        with suppress(fem.Unsolved):  # the grid is too fine, as coarser ones may not be
+            if plan(layers, (), _GRID_MM).slenderness_mm() > _SLENDER_MM:
+                for times in _STRETCHED:
+                    if exact := _exact(cell, layers, [times * far for far in beside_mm]):
+                        return exact
+    flux = _enclosing(cell, layers, beside_mm, outwards=False)
+    return _Meshes(flux, _enclosing(cell, layers, beside_mm, outwards=True), enclosed=True)
+
+
+def _exact(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> _Meshes | None:
+    """Meshes with the outlines of a cell; None where their triangles are too slender or cannot be made."""
+    far_mm = cell.far_mm()
+    with suppress(fem.Unsolved):
+        exact = PrismMesh.of(layers, beside_mm, _GRID_MM, far_mm)
+        if exact.plan.slenderness_mm() > _SLENDER_MM:
+            other = PrismMesh.of(cell.inside_shell(layers), beside_mm, _GRID_MM, far_mm) if cell.air_mm else exact
+            return _Meshes(exact, other, enclosed=False)
+    return None
+
+
+def _enclosing(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float], *, outwards: bool) -> PrismMesh:
+    """Mesh on the finest coarse grid whose triangles are not too slender, else on the last."""
     from sensorgen.solvers.electrostatics.enclosed import enclosing
 
-    far_mm, loose_mm = np.inf if cell.air_mm else _FAR * cell.gap_mm, _LOOSE * cell.gap_mm
-    is_sound = False
-    with suppress(fem.Unsolved):  # the grid is too fine, as coarser ones below may not be
-        is_sound = not cell.outer and plan(layers, (), _GRID_MM).slenderness_mm() > _SLENDER_MM
-    for times in _STRETCHED if is_sound else ():
-        with suppress(fem.Unsolved):
-            beside = [times * far for far in beside_mm]
-            exact = PrismMesh.of(layers, beside, _GRID_MM, far_mm)
-            if exact.plan.slenderness_mm() > _SLENDER_MM:
-                other = PrismMesh.of(cell.inside_shell(layers), beside, _GRID_MM, far_mm) if cell.air_mm else exact
-                return exact, other, False
-    meshes = []
-    for outwards, least_mm in ((False, _SLENDER_MM), (True, _SLENDER_MM / 10)):  # a potential bears more than a flux
-        for grid_mm in _COARSER_MM:
-            some = replace(layers, regions=cell.outer) if outwards and cell.outer else layers
-            near = enclosing(some, grid_mm, far_mm, loose_mm, outwards=outwards)
-            if outwards and cell.air_mm:
-                near = cell.inside_shell(near)
-            mesh = PrismMesh.of(near, beside_mm, grid_mm, far_mm)
-            if mesh.plan.slenderness_mm() > least_mm:
-                break
-        meshes.append(mesh)
-    return meshes[0], meshes[1], True
+    least_mm = _SLENDER_MM / 10 if outwards else _SLENDER_MM  # a potential bears more than a flux
+    some = replace(layers, regions=cell.outer) if outwards and cell.outer else layers
+    for grid_mm in _COARSER_MM:
+        near = enclosing(some, grid_mm, cell.far_mm(), _LOOSE * cell.gap_mm, outwards=outwards)
+        if outwards and cell.air_mm:
+            near = cell.inside_shell(near)
+        mesh = PrismMesh.of(near, beside_mm, grid_mm, cell.far_mm())
+        if mesh.plan.slenderness_mm() > least_mm:
+            break
+    return mesh
 
 
 @dataclass(frozen=True)
@@ -185,6 +206,10 @@ class _Cell:
     air_mm: float = 0.0
     open_sides: tuple[tuple[bool, bool], tuple[bool, bool]] = ((False, False), (False, False))
     outer: list[dict[int, Region]] | None = None
+
+    def far_mm(self) -> float:
+        """Distance from other conductors beyond which outlines are drawn together; infinite with air around [mm]."""
+        return np.inf if self.air_mm else _FAR * self.gap_mm
 
     def inside_shell(self, layers: LayerCell) -> LayerCell:
         """Layers of it in a shell that conducts and floats: any potential in there goes on as a constant outside."""
@@ -228,7 +253,7 @@ def _cell(scene: Scene) -> _Cell:
     if slanted:
         raise ValueError(f"{slanted.name} is slanted or curved in elevation: its layers are no prisms")
     layers = slabs(scene)
-    patterned = [region for slab in layers for region in slab.inner.values()]
+    patterned = _regions(layers)
     x, y = _sides(scene, patterned)
     whole = shapely.box(x.low_mm, y.low_mm, x.high_mm, y.high_mm)
     half = halved((x, y), [shapely.intersection(r, whole) for r in dict.fromkeys(patterned)])
@@ -236,6 +261,11 @@ def _cell(scene: Scene) -> _Cell:
         return _numbered(_levels(layers), _within(layers, *half), *half)
     except _Uncovered as error:
         return _surrounded(scene, layers, x, y, error.gap_mm)
+
+
+def _regions(layers: Sequence[Slab]) -> list[Region]:
+    """Regions of all slabs."""
+    return [region for slab in layers for region in slab.inner.values()]
 
 
 def _levels(layers: Sequence[Slab]) -> list[float]:
@@ -288,66 +318,71 @@ def _surrounded(scene: Scene, layers: Sequence[Slab], x: Repeat, y: Repeat, gap_
     """
     if gap_mm <= SLIVER_MM:
         raise ValueError("the electrodes touch: the capacitance grows without bound")
-    air, regions = _AIR * gap_mm, [region for slab in layers for region in slab.inner.values()]
-    sides, ends = [], []
-    for axis, side in enumerate((x, y)):
-        if scene.repeats[axis]:
-            sides.append(side)
-            ends.append((False, False))
-        else:
-            sides.append(widened(regions, scene.size_mm, axis, air))
-            ends.append((sides[-1].low_mm < 0, True))
-    thick = _SHELL * air
-    levels_mm = _levels(layers)
-    low, high = levels_mm[0] - air, levels_mm[-1] + air
-    inside = _within(layers, sides[0], sides[1])
-    heights = [low - thick, low, *levels_mm, high, high + thick]
-    cell = _numbered(heights, [{}, {}, *inside, {}, {}], sides[0], sides[1], air)
-    return replace(cell, open_sides=(ends[0], ends[1]))
+    air, regions, open_ends = _AIR * gap_mm, _regions(layers), []
+    sides = [x, y]
+    for axis, repeats in enumerate(scene.repeats):
+        if not repeats:
+            sides[axis] = widened(regions, scene.size_mm, axis, air)
+        open_ends.append((not repeats and sides[axis].low_mm < 0, not repeats))
+    inside = _within(layers, *sides)
+    cell = _numbered(_in_air(_levels(layers), air), [{}, {}, *inside, {}, {}], sides[0], sides[1], air)
+    return replace(cell, open_sides=(open_ends[0], open_ends[1]))
+
+
+def _in_air(levels_mm: Sequence[float], air_mm: float) -> list[float]:
+    """Planes with those of the air around, which ends in a layer more [mm]."""
+    low, high, thick = levels_mm[0] - air_mm, levels_mm[-1] + air_mm, _SHELL * air_mm
+    return [low - thick, low, *levels_mm, high, high + thick]
 
 
 def _enclosed(scene: Scene) -> _Cell:
     """A scene with slanted bodies whose electrodes do not cover it: what each slab has at all heights, and at any."""
-    layers = slabs(scene)
-    floating = [body for body in scene.bodies if body.terminal == FLOATING]
-    names = dielectrics(scene.bodies)
-    ends, conductors = {"bottom": BOTTOM, "top": TOP}, 2 + len(floating)
-
-    def kind(body: Body) -> int:
-        if body.terminal == FLOATING:
-            return 2 + floating.index(body)
-        return ends[body.terminal] if body.terminal else conductors + names.index(body.material)
-
-    def numbered(own: dict[Body, Region]) -> dict[int, Region]:
-        by_kind: dict[int, list[Region]] = defaultdict(list)
-        for body, region in own.items():
-            if body.material != "air" and not region.is_empty:
-                by_kind[kind(body)].append(translate(region, -x.low_mm, -y.low_mm))
-        return {k: shapely.union_all(regions) for k, regions in by_kind.items()}
-
-    every = [region for slab in layers for own in (slab.inner, slab.outer) for region in own.values()]
+    layers, names = slabs(scene), dielectrics(scene.bodies)
+    number, conductors = _numbers(scene.bodies, names)
     heights = _levels(layers)
-    x = y = Repeat.of(0.0, 1.0, False, 1.0)
-    gap_mm = _gap_mm([numbered(slab.outer) for slab in layers], heights, conductors)
+    gap_mm = _gap_mm([_merged(slab.outer, number) for slab in layers], heights, conductors)
     if not SLIVER_MM < gap_mm < np.inf:
         raise ValueError("slanted electrodes are nearer than the slabs that they are cut into")
     air = _AIR * gap_mm
-    x, y = (widened([r for r in every if not r.is_empty], scene.size_mm, axis, air) for axis in (0, 1))
+    every = [r for slab in layers for own in (slab.inner, slab.outer) for r in own.values() if not r.is_empty]
+    x, y = (widened(every, scene.size_mm, axis, air) for axis in (0, 1))
     window = shapely.box(0.0, 0.0, x.high_mm - x.low_mm, y.high_mm - y.low_mm)
-
-    def clipped(own: dict[int, Region]) -> dict[int, Region]:
-        return {
-            k: shapely.multipolygons(parts(shapely.intersection(r, window, grid_size=1e-9))) for k, r in own.items()
-        }
-
-    inner, outer = (
-        [{}, {}, *map(clipped, some), {}, {}]
-        for some in ([numbered(slab.inner) for slab in layers], [numbered(slab.outer) for slab in layers])
-    )
-    thick = _SHELL * air
-    around = (heights[0] - air - thick, heights[0] - air, *heights, heights[-1] + air, heights[-1] + air + thick)
+    corner = x.low_mm, y.low_mm
+    inner = [_clipped(_merged(slab.inner, number, corner), window) for slab in layers]
+    outer = [_clipped(_merged(slab.outer, number, corner), window) for slab in layers]
     sides = ((x.low_mm < 0, True), (y.low_mm < 0, True))
-    return _Cell(x, y, around, inner, conductors, names, gap_mm, air, sides, outer)
+    around = tuple(_in_air(heights, air))
+    return _Cell(
+        x, y, around, [{}, {}, *inner, {}, {}], conductors, names, gap_mm, air, sides, [{}, {}, *outer, {}, {}]
+    )
+
+
+def _clipped(own: Mapping[int, Region], window: Region) -> dict[int, Region]:
+    return {k: shapely.multipolygons(parts(shapely.intersection(r, window, grid_size=1e-9))) for k, r in own.items()}
+
+
+def _numbers(bodies: Sequence[Body], names: Sequence[str]) -> tuple[dict[Body, int], int]:
+    """Number of each body, of an electrode, of a conductor that floats, or of its dielectric; and of conductors."""
+    floating = [body for body in bodies if body.terminal == FLOATING]
+    number, conductors = {body: 2 + k for k, body in enumerate(floating)}, 2 + len(floating)
+    ends = {"bottom": BOTTOM, "top": TOP}
+    for body in bodies:
+        if body.terminal in ends:
+            number[body] = ends[body.terminal]
+        elif not body.terminal and body.material != "air":
+            number[body] = conductors + names.index(body.material)
+    return number, conductors
+
+
+def _merged(
+    own: Mapping[Body, Region], number: Mapping[Body, int], corner_mm: tuple[float, float] = (0.0, 0.0)
+) -> dict[int, Region]:
+    """Regions of a slab by number, from a corner; air is left out."""
+    by_number: dict[int, list[Region]] = defaultdict(list)
+    for body, region in own.items():
+        if body.material != "air" and not region.is_empty:
+            by_number[number[body]].append(translate(region, -corner_mm[0], -corner_mm[1]))
+    return {k: shapely.union_all(regions) for k, regions in by_number.items()}
 
 
 def _mirrored(planes: Real, shares: Real) -> Repeat:
@@ -361,14 +396,11 @@ def _numbered(
     levels_mm: list[float], inside: list[dict[Body, Region]], x: Repeat, y: Repeat, air_mm: float = 0.0
 ) -> _Cell:
     """A cell with a number for each conductor, those that touch one, and each dielectric."""
-    pieces = [(k, body.terminal, part) for k, own in enumerate(inside) for body, region in own.items() if body.terminal
-              for part in parts(region)]  # fmt: skip
-    plans = np.array([part for *_, part in pieces])
-    slab, count = np.array([k for k, *_ in pieces]), len(pieces)
+    slab, terminals, plans = _pieces(inside)
     sizes = (x.high_mm - x.low_mm, y.high_mm - y.low_mm)
     one, other = _touching(plans, sizes, (x.shifts, y.shifts))
     near = abs(slab[one] - slab[other]) < 2
-    kinds = _conductors(groups(count, one[near], other[near]).tolist(), [terminal for _, terminal, _ in pieces])
+    kinds = _conductors(groups(len(slab), one[near], other[near]).tolist(), terminals)
     conductors = len({BOTTOM, TOP, *kinds.tolist()})
     uncovered = _uncovered(plans, kinds, sizes)
     low, high = int(slab[kinds == BOTTOM].min()), int(slab[kinds == TOP].max())
@@ -385,6 +417,13 @@ def _numbered(
     if uncovered and not air_mm:
         raise _Uncovered(uncovered, gap_mm)
     return _Cell(x, y, heights, regions, conductors, names, gap_mm, air_mm)
+
+
+def _pieces(inside: Sequence[Mapping[Body, Region]]) -> tuple[Whole, list[str], np.ndarray]:
+    """Number of the slab, terminal and outline of every piece of a conductor."""
+    pieces = [(k, body.terminal, part) for k, own in enumerate(inside) for body, region in own.items() if body.terminal
+              for part in parts(region)]  # fmt: skip
+    return np.array([k for k, *_ in pieces]), [end for _, end, _ in pieces], np.array([part for *_, part in pieces])
 
 
 def _touching(plans: np.ndarray, sizes_mm: tuple[float, float], shifts: tuple[bool, bool]) -> Whole:

@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import UnknownName
-from sensorgen.solvers.sheet.network import BY
 from sensorgen.solvers.sheet.parts import Contact, Port, Sheet, SheetPatch
-from sensorgen.solvers.sheet.solve import PressErrors, Solution, bounds, contact_sets, depth_m, solution
+from sensorgen.solvers.sheet.solve import BY, PressErrors, Solution, bounds, contact_sets, depth_m, solution
 
 __all__ = [
     "BY",

@@ -58,10 +58,12 @@ def _parts(design: Design) -> "list[tuple[Scene, float]]":
 
     Other patterns are whole: models of prisms find the cell, and what the sensor's ends cut off.
     """
+    scene, params = design.in_use, design.params
+    if all(isinstance(p, Prism) for b in scene.bodies for p in b.pieces):
+        return [(scene, 1.0)]
     from sensorgen.scene.patterns import ArrayParams
 
-    scene, params = design.in_use, design.params
-    if not isinstance(params, ArrayParams) or all(isinstance(p, Prism) for b in scene.bodies for p in b.pieces):
+    if not isinstance(params, ArrayParams):
         return [(scene, 1.0)]
     given = design.model_dump(exclude_defaults=True, mode="json")
     parts = []
@@ -186,7 +188,7 @@ def from_gcode(design: Design, file: str | Path) -> Body:
     Raises
     ------
     BadInput
-        No such file; when the cells are needed, as :func:`sensorgen.asprinted.registration.placed`.
+        No such file; when the cells are needed, as :func:`sensorgen.asprinted.beads.placed`.
     """
     path = Path(file)
     with reading(path):
@@ -196,10 +198,10 @@ def from_gcode(design: Design, file: str | Path) -> Body:
 
 def registered(design: Design, path: Path) -> "Printed":
     """Print of a design by a file of G-code; parameters and errors as of :func:`from_gcode`."""
-    from sensorgen.asprinted import printed, registration
+    from sensorgen.asprinted import beads, printed
 
     try:
-        placement = registration.placed(design, path)
+        placement = beads.placed(design, path)
         return printed.body(design, placement.paths, slicer=path.name, centre_mm=placement.centre_mm)
     except BadInput as error:
         raise error.within(str(path)) from None

@@ -110,7 +110,7 @@ def _size(scene: Scene, counted: str) -> Size | None:
 
 def _bands(scene: Scene) -> Size:
     """Pieces of one material in vertical strips without corners."""
-    from sensorgen.scene.unit_cell import cell
+    from sensorgen.scene.repetition import cell
 
     period = cell(sections(scene)[0], scene.size_mm[2])
     return Size(sum(len(s.bands) for s in period.slices), len(set(period.shares)) > 1)

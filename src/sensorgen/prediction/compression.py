@@ -24,15 +24,7 @@ from sensorgen.models.compression import curve_of
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.prediction import capacitance_answer as at_rest
 from sensorgen.prediction.capacitance import Answer, Unpredictable, capacitance, is_plate
-from sensorgen.prediction.compression_law import (
-    case_of,
-    closed_f_per_m2,
-    elastic,
-    gap_m,
-    infill,
-    law_of,
-    under_tops,
-)
+from sensorgen.prediction.compression_law import case_of, closed_f_per_m2, elastic, gap_m, infill, law_of, under_tops
 from sensorgen.prediction.mesh_ladder import (
     MODELS,
     USUAL,

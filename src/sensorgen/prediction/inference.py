@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 
+NORMAL_90 = 1.6448536269514722  # normal deviate of 5 %
 STEP = 1e-3  # of central differences [standard deviations]
 _MOST_LN = 80.0  # of a parameter's logarithm: beyond, numbers overflow
 _STEPS = 30

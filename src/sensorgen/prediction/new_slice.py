@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from sensorgen.asprinted import printed as asprinted
+from sensorgen.checks.review import GCODE
 from sensorgen.checks.volumes import LayerVolume
 from sensorgen.core.findings import Finding
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
+from sensorgen.design.walls import TITLES
 from sensorgen.export.gcode.results import Checked, Lifting
-from sensorgen.export.slicers import TIME_LIMIT_S, TITLES
+from sensorgen.export.slicers import TIME_LIMIT_S
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
-    from sensorgen.export.gcode.drags import Lifted
-
-GCODE = "13-gcode"  # rule of what the check of a G-code file reports
+    from sensorgen.export.gcode.crossings import Lifted
 
 
 @dataclass(frozen=True)

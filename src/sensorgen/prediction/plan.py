@@ -173,13 +173,11 @@ def run_until_within(
     SensorgenError
         Of the last candidate, where all fail.
     """
-    names = [c.model for c in level.candidates if not c.passed_over]
-    start = names.index(level.chosen)
     reached = {c.model: c for c in level.candidates}
-    results: dict[str, tuple[float, Found]] = {}
+    results: list[tuple[float, str, Found]] = []
     failure: SensorgenError | None = None
-    for name in (*names[start:], *reversed(names[:start])):
-        if results and (name in names[:start] or min(w for w, _ in results.values()) <= level.allowed):
+    for name, is_fallback in _order(level):
+        if results and (is_fallback or results[-1][0] <= level.allowed):
             break
         begun = time.perf_counter()
         try:
@@ -187,9 +185,16 @@ def run_until_within(
         except SensorgenError as error:
             failure, reached[name] = error, replace(reached[name], passed_over=str(error))
             continue
-        results[name] = width(answer), answer
-        reached[name] = replace(reached[name], width=results[name][0], seconds=time.perf_counter() - begun)
+        results.append((width(answer), name, answer))
+        reached[name] = replace(reached[name], width=results[-1][0], seconds=time.perf_counter() - begun)
     if not results:
         raise failure or SensorgenError(f"{level.name}: no model applies")
-    best = min(results, key=lambda name: results[name][0])
-    return results[best][1], replace(level, candidates=tuple(reached.values()), chosen=best)
+    _, chosen, answer = min(results, key=lambda each: each[0])
+    return answer, replace(level, candidates=tuple(reached.values()), chosen=chosen)
+
+
+def _order(level: Level) -> list[tuple[str, bool]]:
+    """Candidates from the planned one upwards, then downwards those to fall back on."""
+    names = [c.model for c in level.candidates if not c.passed_over]
+    start = names.index(level.chosen)
+    return [*((name, False) for name in names[start:]), *((name, True) for name in reversed(names[:start]))]

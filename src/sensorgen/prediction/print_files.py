@@ -18,7 +18,7 @@ from sensorgen.core import cache as stored
 from sensorgen.core.errors import SensorgenError, UnknownName
 from sensorgen.design.design import Design
 from sensorgen.design.printer import folder as profiles
-from sensorgen.export.slicers import PROGRAMS, SLICERS
+from sensorgen.design.walls import PROGRAMS, SLICERS
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
@@ -102,23 +102,28 @@ def at_hand(
     SensorgenError
         A slicer that is given is missing, or fails.
     """
-    if not slicer and (file := in_folder(design, folder)):
+    if slicer:
+        return (None, "") if slicer == NONE else _by_slicer(design, slicer, step, program)
+    if file := in_folder(design, folder):
         return file, ""
-    decides = slicer or deciding()
+    decides = deciding()
     if decides == NONE:
-        return None, "no slicer installed" if not slicer and not os.environ.get(VARIABLE) else ""
+        return None, "" if os.environ.get(VARIABLE) else "no slicer installed"
+    try:
+        return _by_slicer(design, decides, step, program)
+    except SensorgenError as error:
+        return None, str(error)
+
+
+def _by_slicer(design: Design, slicer: str, step: Step, program: str) -> tuple[PrintFile | None, str]:
+    """G-code of a design by a slicer, now or before; or None, and why it is not sliced."""
     from sensorgen.export.slicers.run import find
 
-    try:
-        program = find(*PROGRAMS[decides], program)
-        question = _question(design, decides, program)
-        if stored.known(question) is None and not _fits(design):
-            return None, "it does not fit the bed"
-        return _sliced(design, decides, program, question, step), ""
-    except SensorgenError as error:
-        if slicer:
-            raise
-        return None, str(error)
+    program = find(*PROGRAMS[slicer], program)
+    question = _question(design, slicer, program)
+    if stored.known(question) is None and not _fits(design):
+        return None, "it does not fit the bed"
+    return _sliced(design, slicer, program, question, step), ""
 
 
 def _fits(design: Design) -> bool:

@@ -370,11 +370,10 @@ def _with_tops(result: Prediction, model: SensorModel, load: Load, query: Query)
         for name, law in sorted(model.law.tops.items())
         if name != tip.block
     )
-    known = result.identifiability
-    tops = [
-        UnderTop(tip.material, **own, calibrated=known and known.calibrated, typical=known and known.map.typical()),
-        *filter(None, others),
-    ]
+    first, known = UnderTop(tip.material, **own), result.identifiability
+    if known:
+        first = replace(first, calibrated=known.calibrated, typical=known.map.typical())
+    tops = [first, *filter(None, others)]
     wider: dict[str, Any] = {}
     apart = False
     for key, bounds in own.items():

@@ -1,7 +1,7 @@
 """A body at rest: capacitance with what its range holds, losses of its dielectrics, resistance of its electrodes."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, pi, prod
 from typing import NamedTuple
 
@@ -306,11 +306,13 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
     except Unpredictable as error:
         raise Unpredictable("; ".join((*remarks, str(error)))) from None
     c = answer.capacitance_f
-    others, unknown, unbounded = _other_prints(cells, eps, wanted) if ranges else ([], [], False)
+    ways = cells if ranges else replace(cells, scenes={"most likely": scene}, film=None)
+    others, unknown, unbounded = _other_prints(ways, eps, wanted)
     by_width = Interval(min([c.middle(), *others]), max([c.middle(), *others]))
-    thick, thin, layer = _film_ratios(cells, eps) if ranges else (1.0, 1.0, 0.0)
-    by_film = Interval(c.middle() * thick, c.middle() * (thin or 1.0))
-    by_print = Interval(by_width.lower * thick, by_width.upper * (thin or 1.0))
+    thick, thin, layer = _film_ratios(ways, eps)
+    thinnest = thin or 1.0
+    by_film = Interval(c.middle() * thick, c.middle() * thinnest)
+    by_print = Interval(by_width.lower * thick, by_width.upper * thinnest)
     bounds = Bounds.of(
         c.middle(), "F", model=c, print=by_print, certified=True,
         open="upper" if unbounded or thin is None else "",

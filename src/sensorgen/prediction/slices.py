@@ -6,14 +6,12 @@ from pathlib import Path
 
 from sensorgen.asprinted import printed as asprinted
 from sensorgen.checks import bridges
-from sensorgen.checks.review import LOST, Review, Step, advised, review
+from sensorgen.checks.review import GCODE, LOST, Review, Step, advised, review
 from sensorgen.core.errors import MissingValue
 from sensorgen.core.findings import Finding, grouped
 from sensorgen.design.design import Design
 from sensorgen.design.values import permittivities, resistivities
-from sensorgen.design.walls import WALLS, rule
-from sensorgen.export.slicers import SLICERS
-from sensorgen.prediction.new_slice import GCODE
+from sensorgen.design.walls import SLICERS, WALLS, rule
 from sensorgen.prediction.print_files import NONE, PrintFile, at_hand
 from sensorgen.prediction.results import unpredicted
 

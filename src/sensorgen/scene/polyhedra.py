@@ -129,13 +129,12 @@ class Polyhedron:
     def _crossed(self, below: list[bool], axis: str) -> dict[tuple[int, int], tuple[int, int]]:
         """Edges that a plane crosses, each with the next one, by the vertices that lie below it."""
         after: dict[tuple[int, int], tuple[int, int]] = {}
-        for triangle in self.triangles:
-            sides = [(triangle[k - 1], triangle[k]) for k in range(3)]
-            up = next((s for s in sides if below[s[0]] and not below[s[1]]), None)
-            if up:
-                down = next((b, a) for a, b in sides if below[b] and not below[a])
-                # (x, z) is left-handed: seen against y, triangles run the other way round
-                after[up if axis == "y" else down] = down if axis == "y" else up
+        for a, b, c in self.triangles:
+            sides = (c, a), (a, b), (b, c)
+            up = [(start, end) for start, end in sides if below[start] > below[end]]
+            down = [(end, start) for start, end in sides if below[start] < below[end]]
+            # (x, z) is left-handed: seen against y, triangles run the other way round
+            after.update(zip(up, down, strict=True) if axis == "y" else zip(down, up, strict=True))
         return after
 
     def moved(self, move: Move) -> "Polyhedron":
@@ -305,19 +304,21 @@ def surface(piece: Piece) -> Polyhedron:
 
 @lru_cache(maxsize=64)
 def _of_loft(loft: Loft) -> Polyhedron:
-    n, numbers = len(loft.lower), dict[Place, int]()
+    numbers = dict[Place, int]()
     ends = (loft.lower, loft.bottom_mm), (loft.upper, loft.top_mm)
-    ring = [numbers.setdefault((x, y, z), len(numbers)) for o, z in ends for x, y in o]
+    below, above = ([numbers.setdefault((x, y, z), len(numbers)) for x, y in o] for o, z in ends)
     triangles = []
-    for k in range(n):
-        before = (k - 1) % n
-        a, b, c, d = ring[before], ring[k], ring[n + k], ring[n + before]
+    for k in range(len(below)):
+        a, b, c, d = below[k - 1], below[k], above[k], above[k - 1]
         triangles += [(a, b, c), (a, c, d)]
-    for (outline, _), first in zip(ends, (0, n), strict=True):
-        if abs(area_mm2(outline)) > SLIVER_MM**2:
-            cap = [(ring[first + a], ring[first + b], ring[first + c]) for a, b, c in triangulated(outline)]
-            triangles += cap if first else [(c, b, a) for a, b, c in cap]
+    triangles += [(below[c], below[b], below[a]) for a, b, c in _cap(loft.lower)]
+    triangles += [(above[a], above[b], above[c]) for a, b, c in _cap(loft.upper)]
     return Polyhedron(tuple(numbers), tuple(t for t in triangles if len(set(t)) == 3))
+
+
+def _cap(outline: Outline) -> list[tuple[int, int, int]]:
+    """Triangles of an end of a loft; none where it is a line or a point."""
+    return triangulated(outline) if abs(area_mm2(outline)) > SLIVER_MM**2 else []
 
 
 def triangulated(outline: Outline) -> list[tuple[int, int, int]]:

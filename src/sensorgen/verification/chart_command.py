@@ -45,7 +45,7 @@ def _of_design(
     from sensorgen.analysis.plots.figure import needed
     from sensorgen.core.document import to_json
     from sensorgen.prediction.query import Query
-    from sensorgen.verification.design_chart import plot
+    from sensorgen.verification.chart import plot
     from sensorgen.verification.design_chart.results import chart
 
     needed("matplotlib", "plotly")
@@ -59,8 +59,8 @@ def _of_design(
         measured = chart(body(design), Query(force_n=force_n), keys, budget_s=budget, step=on)
     contents = {"chart.json": to_json(measured).encode(), "chart.csv": "".join(measured.csv()).encode()}
     if measured.points:
-        contents |= {"chart.png": plot.png(measured)}
-    contents["chart.html"] = plot.html(measured).encode()
+        contents |= {"chart.png": plot.png_of_design(measured)}
+    contents["chart.html"] = plot.html_of_design(measured).encode()
     names = render.written(output, contents.items())
     render.deliver(measured)
     if not render.form():

@@ -31,8 +31,7 @@ def command(
         What to write; may be given several times.
     """
     from sensorgen.verification import thesis
-    from sensorgen.verification.thesis.items import CHAPTERS
-    from sensorgen.verification.thesis.verdicts import UNEXPLAINED, WORDS
+    from sensorgen.verification.thesis.items import CHAPTERS, UNEXPLAINED, WORDS
 
     if find_spec("ngsolve") is None:  # other models would answer, and differ
         raise NotInstalled("thesis needs the solver NGSolve: pip install 'sensorgen[fem]'")

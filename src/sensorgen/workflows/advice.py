@@ -15,9 +15,18 @@ from sensorgen.design import best
 from sensorgen.design.design import Design
 from sensorgen.prediction.results import UNPREDICTED
 from sensorgen.workflows import moves
-from sensorgen.workflows.changes import Advice, Change, TriedChange, effects, finding_counts
 from sensorgen.workflows.moves import Candidate, Nearest
-from sensorgen.workflows.trial import Trial, grade, trial, words_of
+from sensorgen.workflows.trial import (
+    Advice,
+    Change,
+    Trial,
+    TriedChange,
+    effects,
+    finding_counts,
+    grade,
+    trial,
+    words_of,
+)
 
 BUDGET_S = 60.0
 SHOWN = 3

@@ -30,11 +30,9 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless, to_json
 from sensorgen.prediction.slices import PrintReview, reviewed
-from sensorgen.workflows import compensation, decision, sealed
-from sensorgen.workflows.changes import Advice, effects
-from sensorgen.workflows.compensation import Adjustment
+from sensorgen.workflows import decision, sealed
 from sensorgen.workflows.decision import Decision
-from sensorgen.workflows.trial import Trial, table, trial
+from sensorgen.workflows.trial import NOT_COMPARED, Adjustment, Advice, Trial, compensation, effects, table, trial
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
 LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
@@ -86,7 +84,7 @@ class Built:
     trial: Trial | None = None
     advice: Advice | None = None
     source: str = ""
-    compared: str = compensation.NOT_COMPARED
+    compared: str = NOT_COMPARED
 
     def document(self) -> Iterator[Part]:
         """Verdict, quantities drawn beside printed, and the three findings that matter most."""
@@ -108,7 +106,7 @@ class Built:
             yield f"{self.folder}: {len(self.files)} files; --details prints all, --advise tries changes"
 
     def _head(self) -> Iterator[Part]:
-        yield from compensation.document(self.compensated, self.compared)
+        yield from compensation(self.compensated, self.compared)
         yield headline(self.name, self.findings, self.source)
         yield ""
 
@@ -209,12 +207,12 @@ def build(
 def _compared(asked: Design | None, now: Trial | None) -> str:
     """Effect of a compensation on the resolutions, as far as the print of what was asked for is predicted."""
     if not (asked and now and decision.is_known(asked)):
-        return compensation.NOT_COMPARED
+        return NOT_COMPARED
     try:
         with only_known():
             _, words = effects(trial(asked, drawn=False), now)
     except (Unknown, SensorgenError):
-        return compensation.NOT_COMPARED
+        return NOT_COMPARED
     return f"against the print of what was asked for: {words or 'it senses as that does'}"
 
 

@@ -4,15 +4,14 @@ Asked for, its stiffness too: the pressure per displacement of its top.
 """
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict
 from functools import partial
 from math import ceil, copysign, exp, floor, inf, log, prod
 from typing import Any
 
 from sensorgen.checks.review import review
 from sensorgen.checks.widths import GAP_CLOSES
-from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import OutOfRange, SensorgenError
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design, make, name_of
@@ -21,6 +20,7 @@ from sensorgen.prediction import bodies
 from sensorgen.scene.scene import SLIVER_MM
 from sensorgen.workflows import moves
 from sensorgen.workflows.moves import Candidate, Key, Nearest
+from sensorgen.workflows.trial import Adjustment
 
 BAKE = 0.2  # what the bake takes off in the plane (thesis 6.2)
 FILM_LAYERS = 2  # of a film at least: through one layer leads every slit between two lines
@@ -28,10 +28,6 @@ GAP, CAPACITANCE, STIFFNESS = "gap_mm", "capacitance_pf", "stiffness_kpa_per_mm"
 UNITS = {GAP: "mm", CAPACITANCE: "pF", STIFFNESS: "kPa/mm"}
 WITHIN = {GAP: 0.03, CAPACITANCE: 0.02, STIFFNESS: 0.1}  # relative errors; whole layers leave few stiffnesses
 ESTIMATE_WITHIN = WITHIN | {CAPACITANCE: 0.01}  # of a changed design before it is sliced
-NOT_COMPARED = (
-    "aimed at these alone: the print may sense force and position worse than that of what was asked for; build that, "
-    "then this again, to compare"
-)
 PERIOD = ("parameters", "period_mm")
 PRESSURE_PA = 80e3  # 8 N on 10 x 10 mm: under which a stiffness is meant
 FARTHEST = 2.0  # distance of a change, as of moves.distance [-]
@@ -48,35 +44,6 @@ _PERIODS = 4  # of a sensor by which prints are estimated
 
 BodyOf = Callable[[Design], Body]
 Quantities = Mapping[str, float]  # those of UNITS that are known
-
-
-@dataclass(frozen=True)
-class Adjustment:
-    """One thing that was changed, or that comes out changed.
-
-    Attributes
-    ----------
-    what : str
-        Parameter, or what it does.
-    before, after : float
-        Values, in the unit that its name ends in.
-    why : str
-        In a few words.
-    """
-
-    what: str
-    before: float
-    after: float
-    why: str
-
-
-def document(changes: Sequence[Adjustment], compared: str = NOT_COMPARED) -> Iterator[Part]:
-    """Changes, if any, and their effect on what the sensor is for."""
-    if changes:
-        yield "compensated for the print:"
-        yield Facts(tuple((f"  {c.what}", f"{c.before:.4g} -> {c.after:.4g}: {c.why}") for c in changes))
-        yield compared
-        yield ""
 
 
 def compensated(
@@ -132,8 +99,7 @@ def compensated(
         layers = f"{FILM_LAYERS} layers at least, {wanted[GAP]:g} mm at layers of {now.layers.layer_mm:g} mm"
         raise _refused(f": a film has {layers}", design, made, printed, asked)
     if search.best is None:
-        reason = next((f" without an error ({one.discarded})" for one in search.estimates if one.discarded), "")
-        raise _refused(f" of {design.name} by {walls} walls{reason}", design, made, printed, asked)
+        raise _refused(f" of {design.name} by {walls} walls{search.fault()}", design, made, printed, asked)
     if not after.values:
         return now, changes
     why = "gap, capacitance and stiffness" if stiffness else "gap and capacitance"
@@ -280,6 +246,10 @@ class CompensationSearch(Nearest):
             return round(gap, 6), sum(others)
 
         return min(self.prints or (one for one in self.estimates if not one.discarded), key=distance)
+
+    def fault(self) -> str:
+        """Reason of the first design that a rule refuses, in words."""
+        return next((f" without an error ({one.discarded})" for one in self.estimates if one.discarded), "")
 
     def order(self, one: Candidate) -> tuple[float, ...]:
         """Distance and half of what the capacitance was off before; half way of a width that it leads to."""

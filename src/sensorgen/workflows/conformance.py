@@ -144,20 +144,30 @@ def _shape_texts(word: str) -> list[tuple[str, str, str]]:
 def conformance(word: str, step: Step = lambda _: None) -> PackReport:
     """Test the files of a pack; ``word`` as of :func:`chosen`, ``step`` gets the name of each file."""
     pack = None if Path(word).is_file() else _pack(word)
-    files, findings = _files(pack) if pack else [_one(word)], list[Finding]()
-    try:
-        packs.check_requires(pack or files[0].pack)
-    except SensorgenError as error:
-        findings.append(_finding("requires", packs.MANIFEST, str(error), "install it, or correct 'requires'"))
-    if pack and pack.where != "shipped":
-        findings += [_finding("place", *words) for words in _misplaced(pack)]
-        findings += [_finding("name", *words) for words in _twice(pack, files)]
+    files = _files(pack) if pack else [_one(word)]
+    findings = list(_of_pack(pack, files) if pack else _requirements(files[0].pack))
     if not files and not findings:
         raise _nothing(word)
     for file in files:
         step(file.name)
         findings += _of_file(file, step)
     return PackReport(word, len(files), counts(findings), tuple(findings))
+
+
+def _of_pack(pack: Pack, files: Sequence[File]) -> Iterator[Finding]:
+    """Findings about a pack as a whole."""
+    yield from _requirements(pack)
+    if pack.where != "shipped":
+        yield from (_finding("place", *words) for words in _misplaced(pack))
+        yield from (_finding("name", *words) for words in _twice(pack, files))
+
+
+def _requirements(pack: Pack) -> Iterator[Finding]:
+    """Requirements of a pack that are not met."""
+    try:
+        packs.check_requires(pack)
+    except SensorgenError as error:
+        yield _finding("requires", packs.MANIFEST, str(error), "install it, or correct 'requires'")
 
 
 def _of_file(file: File, step: Step) -> list[Finding]:
@@ -263,22 +273,27 @@ def _material(file: File) -> Faults:
     for quantity, values in (*material.properties.items(), *material.print.items()):
         if quantity not in known:
             yield "quantity", str(UnknownName("quantity", quantity, known)), "take a name that sensorgen reads"
-        yield from _material_values(quantity, values, cited)
+        yield from _default(quantity, values)
+        for value in values:
+            yield from _material_value(quantity, value, cited)
     if not material.properties and not material.print:
         yield "values", "no values", "add at least one quantity"
 
 
-def _material_values(quantity: str, values: Sequence[materials.Value], cited: set[str]) -> Faults:
-    """Faults of the values of one quantity."""
+def _default(quantity: str, values: Sequence[materials.Value]) -> Faults:
+    """Lack of a default among the values of one quantity."""
     usable = [value.source for value in values if not value.implausible and math.isfinite(value.value)]
     if usable and not any(value.default for value in values):
         yield "default", f"{quantity} has no default value", f"add 'default: true' to that of {usable[0]}"
-    for value in values:
-        if value.source not in cited:
-            where = "say under 'citations' where it is published"
-            yield "source", f"{quantity}: source {value.source!r} is not explained", where
-        if value.default and value.implausible:
-            yield "default", f"{quantity} of {value.source} is implausible and a default", "remove one of them"
+
+
+def _material_value(quantity: str, value: materials.Value, cited: set[str]) -> Faults:
+    """Faults of one value."""
+    if value.source not in cited:
+        where = "say under 'citations' where it is published"
+        yield "source", f"{quantity}: source {value.source!r} is not explained", where
+    if value.default and value.implausible:
+        yield "default", f"{quantity} of {value.source} is implausible and a default", "remove one of them"
 
 
 def _program(file: File, text: str) -> Faults:

@@ -19,8 +19,7 @@ from sensorgen.design.design import Design
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.slices import PrintReview, reviewed
-from sensorgen.workflows.changes import Advice
-from sensorgen.workflows.trial import Trial, table, trial
+from sensorgen.workflows.trial import Advice, Trial, table, trial
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed

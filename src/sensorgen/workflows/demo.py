@@ -110,7 +110,7 @@ def demo(folder: Path, *, count: int = 5, seed: int = 1, step: Callable[[str], N
     BadInput
         The folder has files.
     """
-    from sensorgen.measure.log import Log, importing
+    from sensorgen.measure.log import Log, exchange
     from sensorgen.workflows import batch
 
     store.new_folder(folder)
@@ -119,7 +119,7 @@ def demo(folder: Path, *, count: int = 5, seed: int = 1, step: Callable[[str], N
     step("print: batch column.yaml")
     printed = batch.make(plan, folder, gcode=False, force=True)
     with Log(folder / LOG, create=True) as log:
-        importing.import_file(log, printed.folder / "batch.json", {})
+        exchange.import_file(log, printed.folder / "batch.json", {})
         names = sorted(printed.record.specimens)
         works = [(folder, name, seed + k) for k, name in enumerate(names)]
         truths: dict[str, Mapping[str, float]] = {}

@@ -47,7 +47,7 @@ class InsoleRun:
     dead: Annotated[int, Column("dead")]
     before_kpa: Annotated[float, Column("error before calibration", "kPa", digits=3)]
     error_kpa: Annotated[float, Column("error", "kPa", about="rms of all determined crossings and frames", digits=3)]
-    noise_kpa: Annotated[float, Column("of it noise", "kPa", digits=3)]
+    noise_kpa: Annotated[float, Column("noise predicted", "kPa", digits=3)]
     coverage: Annotated[float, Column("in the interval", about="of 90 %", digits=3)]
     force: Annotated[float, Column("force error", "%", about="rms over its largest, dead crossings filled", digits=2)]
     lost: Annotated[float, Column("force on dead ones", "%", digits=2)]
@@ -114,7 +114,7 @@ def demo(folder: Path, *, seed: int = 1, step: Callable[[str], None] = lambda _:
     step("change")
     change = min(_CHANGES, key=_noise_after)
     second, again, true_again = _run(folder, "insole-changed", _with(change), seed, step)
-    advice = f"{change[2]}; noise was {first.noise_kpa:.2g} of {first.error_kpa:.2g} kPa"
+    advice = f"{change[2]}; noise of {first.noise_kpa:.2g} kPa was predicted, the error was {first.error_kpa:.2g} kPa"
     runs, page = (first, second), folder / "maps.html"
     shown = InsoleDemo(str(folder), str(page), runs, advice)
     figures = tuple(

@@ -17,8 +17,7 @@ from sensorgen.core.findings import Finding
 from sensorgen.design.best import KnownDesign
 from sensorgen.design.design import Design, make
 from sensorgen.scene.scene import Envelope
-from sensorgen.workflows.changes import finding_counts
-from sensorgen.workflows.trial import Trial
+from sensorgen.workflows.trial import Trial, finding_counts
 
 Key = tuple[str, ...]  # of a design file, as in ("parameters", "period_mm")
 Value = float | str
@@ -135,20 +134,17 @@ def onto_grid(design: Design) -> list[dict[Key, Value]]:
     return [dict(moves) for moves in (*zip(*pairs, strict=True), nearer) if len(moves) > 1]
 
 
-def _choices(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
-    """Another choice of printing the same sensor."""
-    nozzle = design.machine.nozzle_mm
-    finer = [size for size in NOZZLES_MM if size < nozzle - _EPS]
-    if kind == "walls":
-        yield ("profile", "walls"), "arachne" if design.walls == "classic" else "classic"
-    elif kind == "orientation":
-        yield ("orientation",), "as-drawn" if design.orientation == "upside-down" else "upside-down"
-    elif kind == "quality":
-        yield from ((("quality",), name) for name in QUALITIES if name != design.quality)
-    elif kind == "nozzle" and finer:
-        yield ("nozzle_mm",), finer[-1]
-    elif kind == "support" and not design.materials.support:
-        yield ("materials", "support"), SUPPORT
+def _choices(design: Design, kind: str) -> list[tuple[Key, Value]]:
+    """Other choices of a kind for printing the same sensor."""
+    finer = [size for size in NOZZLES_MM if size < design.machine.nozzle_mm - _EPS]
+    others: dict[str, list[tuple[Key, Value]]] = {
+        "walls": [(("profile", "walls"), "arachne" if design.walls == "classic" else "classic")],
+        "orientation": [(("orientation",), "as-drawn" if design.orientation == "upside-down" else "upside-down")],
+        "quality": [(("quality",), name) for name in QUALITIES if name != design.quality],
+        "nozzle": [(("nozzle_mm",), size) for size in finer[-1:]],
+        "support": [] if design.materials.support else [(("materials", "support"), SUPPORT)],
+    }
+    return others.get(kind, [])
 
 
 def _heights(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:

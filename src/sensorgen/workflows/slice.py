@@ -13,15 +13,14 @@ from sensorgen.core.document import Part
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.findings import Finding, Verdict, headline, listed
 from sensorgen.design.design import Design
-from sensorgen.design.walls import rule
+from sensorgen.design.walls import SLICERS, rule
 from sensorgen.export.gcode.results import FileNeeds
-from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
+from sensorgen.export.slicers import TIME_LIMIT_S
 from sensorgen.export.slicing import Step
 from sensorgen.prediction.new_slice import SliceReport, slice_now
 from sensorgen.prediction.print_files import NONE, PrintFile
 from sensorgen.prediction.slices import PrintReview, combined, of_own_machine, reviewed
-from sensorgen.workflows import compensation
-from sensorgen.workflows.compensation import Adjustment
+from sensorgen.workflows.trial import Adjustment, compensation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +46,7 @@ class SlicedFile(SliceReport):
 
     def document(self) -> Iterator[Part]:
         """Verdict, findings about design, file and print, and what the file takes."""
-        yield from compensation.document(self.compensated)
+        yield from compensation(self.compensated)
         yield headline(self.name, self.all_findings, self.slicer.words)
         yield from listed(self.all_findings)
         yield from FileNeeds.document(self)

@@ -23,16 +23,15 @@ from sensorgen.prediction.calibration.fitting import Data, Posterior, calibrated
 from sensorgen.prediction.calibration.inversion import InvertedPresses
 from sensorgen.prediction.calibration.materials import links
 from sensorgen.prediction.calibration.rest import RestChange, checked
+from sensorgen.prediction.calibration.specimen import SURE, SpecimenModel
 from sensorgen.prediction.calibration.specimen import Bench as Bench
-from sensorgen.prediction.calibration.specimen import SpecimenModel
 from sensorgen.prediction.calibration.specimen import spread_of as spread_of
-from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
+from sensorgen.prediction.inverse.verdict import chi2_limit
 from sensorgen.prediction.query import TONES_HZ, Query
 from sensorgen.prediction.sensor_model import SensorModel, sensor_model
 
 FEWEST_RECHECK = 3  # presses from which on a change can be told
 _ALARM = 2.5758293035489004  # normal deviate of 0.5 %
-_SURE = 2 * NORMAL_90  # widths of a 90 % interval, in standard deviations
 _BAKED = {True: "baked", False: "not baked", None: "of unknown bake"}
 _INSTRUMENT = ("lead", "stray", "force offset", "position offset")  # shared by specimens that are measured in one go
 
@@ -373,7 +372,7 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
     most = max(old.force_n, float(data.presses.force_n.max()))
     known = replace(old, rechecked=True)  # without the allowance that these presses decide on
     at = known.inverter(np.median(data.noise, axis=0), limit_n=BEYOND * most).batch(data.ratio)
-    sd = np.ptp(at.force_90_n, axis=1) / _SURE
+    sd = np.ptp(at.force_90_n, axis=1) / SURE
     z = float(np.mean((data.presses.force_n - at.force_n) / sd) * np.sqrt(count))
     change = old.baseline.change(np.exp(data.rest), data.rest_noise)
     if change:

@@ -11,7 +11,7 @@ from sensorgen.core import document
 from sensorgen.core.units import M_PER_MM
 from sensorgen.prediction.calibration.calibration import Calibration, inside
 from sensorgen.prediction.calibration.inversion import LEVEL
-from sensorgen.prediction.inverse.verdict import NORMAL_90
+from sensorgen.prediction.inference import NORMAL_90
 
 _RESIDUALS = ("residual of the magnitude [%]", "residual of the phase [0.01 rad]")  # measured less fitted
 

@@ -25,8 +25,7 @@ from sensorgen.measure.signal.run import processed
 from sensorgen.prediction.calibration.fitting import Data, MeterReadings
 from sensorgen.prediction.calibration.rest import checked
 from sensorgen.prediction.calibration.specimen import Presses, no_presses
-from sensorgen.prediction.inference import whitening
-from sensorgen.prediction.inverse.verdict import NORMAL_90
+from sensorgen.prediction.inference import NORMAL_90, whitening
 from sensorgen.prediction.query import TONES_HZ
 
 _LEAST_ERROR = 3e-4  # of a mean at rest: from one recording to the next it differs by more than its noise

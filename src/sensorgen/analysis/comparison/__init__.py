@@ -1,7 +1,7 @@
 """Prediction of specimens beside their measurements."""
 
 from array import array
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, lru_cache
@@ -157,10 +157,7 @@ def of_iteration(
     printed = _printed(log, left_out)
     refused = dict[str, str]()
     by_specimen = _by_specimen(log, iteration, specimens, printed, refused, left_out)
-    by_id = {design.id(): design for design in {id(d): d for d in by_specimen.values()}.values()}
-    alike = Counter(design.name for design in by_id.values())
-    names = {name: _label(design, alike) for name, design in by_specimen.items()}
-    designs = {label: by_id[key] for label, key in sorted((_label(d, alike), key) for key, d in by_id.items())}
+    names, designs = _labelled(by_specimen)
     ids = {name: design.ids() for name, design in designs.items()}
     for specimen in by_specimen.keys() & printed.keys():
         ids[names[specimen]].add(printed[specimen].design_id)  # another version of sensorgen may have named it
@@ -186,9 +183,16 @@ def of_iteration(
     return Comparison(rows, measured.alternating, built, names, expected, (*left_out, *_first(_unused(rows, ac))))
 
 
-def _label(design: Design, alike: Mapping[str, int]) -> str:
-    """Name of a design, with its identity where another one has the same name."""
-    return design.name if alike[design.name] < 2 else f"{design.name} ({design.id()[:8]})"
+def _labelled(by_specimen: Mapping[str, Design]) -> tuple[dict[str, str], dict[str, Design]]:
+    """Label of each specimen's design: its name, with its identity where another one has that name; designs by it."""
+    by_id = {design.id(): design for design in {id(d): d for d in by_specimen.values()}.values()}
+    alike = Counter(design.name for design in by_id.values())
+
+    def label(design: Design) -> str:
+        return design.name if alike[design.name] < 2 else f"{design.name} ({design.id()[:8]})"
+
+    designs = {name: by_id[key] for name, key in sorted((label(d), key) for key, d in by_id.items())}
+    return {name: label(design) for name, design in by_specimen.items()}, designs
 
 
 def _begun(
@@ -300,14 +304,14 @@ def _usual_ohm(
     ranges where there are any: else broken prints vouch for each other, and against a sound one. No further than the
     prediction's range; the shape's median where none is predicted.
     """
-    within: dict[tuple[str, bool], array[float]] = {}
-    every: dict[tuple[str, bool], array[float]] = {}
+    within: dict[tuple[str, bool], array[float]] = defaultdict(lambda: array("d"))
+    every: dict[tuple[str, bool], array[float]] = defaultdict(lambda: array("d"))
     for reading, of in zip(rows, of_rows, strict=True):
         alone, ohm = of.ry_ohm if of else None, least(_evidence(reading, None))
-        in_range = [each for each in ohm if alone and alone.lower <= each <= alone.upper]
         key, value = (reading.shape, alone is not None), alone.value if alone else 1.0
-        for ratios, known in ((every, ohm), (within, in_range)):
-            ratios.setdefault(key, array("d")).extend(each / value for each in known)
+        every[key].extend(each / value for each in ohm)
+        if alone:
+            within[key].extend(each / value for each in ohm if alone.lower <= each <= alone.upper)
     medians = {key: expected_from(within[key] or values) for key, values in every.items()}
 
     def usual(shape: str, of: Predicted | None) -> float:

@@ -4,7 +4,7 @@ from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.lazy import Lazy
 from sensorgen.measure.log import BenchRun, Log, Reading
-from sensorgen.measure.log.bench import read_again
-from sensorgen.measure.recording import Joined, Recording, RigLog, Source, joined_all
-from sensorgen.measure.signal.run import processed
+
+if TYPE_CHECKING:
+    from sensorgen.measure.recording import Joined, Recording, RigLog, Source
 
 
 class Words(NamedTuple):
@@ -136,7 +136,7 @@ class RecordedRun(DrawnRecording):
     """
 
     entry: BenchRun
-    source: Source
+    source: "Source"
     samples: int
     valid: int
     seconds: float
@@ -146,12 +146,11 @@ class RecordedRun(DrawnRecording):
     notes: tuple[str, ...]
 
 
-def _name(entry: BenchRun, source: Source) -> str:
+def _name(entry: BenchRun, source: "Source") -> str:
     """Specimen, the recording's number in the log, and whether it is simulated."""
     part = f", part {source.part}" if source.part else ""
     lockin = f", lock-in {source.lockin}" if source.lockin > 1 else ""
-    simulated = ", simulated" if entry.simulated else ""
-    return f"{entry.specimen}, recording {entry.number}{part}{lockin}{simulated}"
+    return f"{entry.specimen}, recording {entry.number}{part}{lockin}{', simulated' * entry.simulated}"
 
 
 def runs(
@@ -171,6 +170,8 @@ def runs(
         Names of specimens, in place of an iteration.
     """
     for entry in log.about(BenchRun, iteration, specimens):
+        from sensorgen.measure.log.bench import read_again  # and all that reads recordings, where the log has one
+
         name = f"recording {entry.number}, {entry.specimen}"
         with _noted(left_out, name):
             parts, pressed = read_again(log, entry)
@@ -201,8 +202,11 @@ def _at_rest(impedance_ohm: Complex) -> tuple[Complex, Complex, Complex]:
     return z.mean(axis=0), np.asarray(scatter / np.sqrt(max(len(z), 1))), scatter
 
 
-def _of_part(entry: BenchRun, lockins: Sequence[Recording], pressed: RigLog | None) -> Iterator[RecordedRun]:
+def _of_part(entry: BenchRun, lockins: "Sequence[Recording]", pressed: "RigLog | None") -> Iterator[RecordedRun]:
     """All lock-ins of a part, each with the rig's log, or without if they cannot be joined."""
+    from sensorgen.measure.recording import joined_all
+    from sensorgen.measure.signal.run import processed
+
     beside: Sequence[Joined | None] = [None] * len(lockins)
     without = "no log of the rig: force and position are not known"
     if pressed is not None:
@@ -213,8 +217,8 @@ def _of_part(entry: BenchRun, lockins: Sequence[Recording], pressed: RigLog | No
     for recording, with_rig in zip(lockins, beside, strict=True):
         done = processed(recording, with_rig)
         one, counts = done.recording, done.recording.counts()
-        marked = {name: count for name, count in counts.items() if count and name not in ("samples", "valid")}
-        marks = (f"{count} samples marked: {name}" for name, count in marked.items())
+        marked = (name for name, count in counts.items() if count and name not in ("samples", "valid"))
+        marks = (f"{counts[name]} samples marked: {name}" for name in marked)
         notes = (*filter(None, [without]), *done.notes, *marks)
         valid = one.valid()
         rest, spread, scatter = _at_rest(done.pairs.before_ohm if done.pairs else one.impedance_ohm[valid])

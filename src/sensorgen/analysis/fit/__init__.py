@@ -4,7 +4,7 @@ Specimens are held back: the values come from the others, and the errors before 
 """
 
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from itertools import chain
 from math import log, nan, sqrt
@@ -71,8 +71,8 @@ def fit(
     step("recordings")
     measured = list(_measured(log, (iteration, specimens), comparison, bench or Bench(), body_of, left_out))
     allowing = list(_allowing(comparison))
-    readings = [(row.reading.specimen, reading) for row, reading in allowing if usable(row)]
-    names = sorted({specimen for specimen, _ in readings} | {one.specimen for one, _ in measured})
+    data = _FitData([(row.reading.specimen, reading) for row, reading in allowing if usable(row)], measured)
+    names = sorted(data.specimens())
     if not names:
         of = ", ".join(specimens) or f"iteration {iteration}"
         raise BadInput(
@@ -81,21 +81,40 @@ def fit(
         )
     apart, design = held_back(names, seed, held_share), next(iter(comparison.bodies.values())).design
     step("values")
-    fits = [
-        estimates.of_specimen(one, print_, Movable(comparison.bodies[comparison.names[one.specimen]]))
-        for one, print_ in measured if one.specimen not in apart
-    ]  # fmt: skip
-    values, untold = _fitted([reading for name, reading in readings if name not in apart], fits, design, seed)
+    values, untold = _fitted(data.of(set(names) - apart), comparison, design, seed)
     step("errors")
-    errors = (
-        *_reading_errors({specimen for specimen, _ in readings} & apart, comparison, values),
-        *_rest_errors([one for one, _ in measured if one.recorded and one.specimen in apart], comparison, values),
-    )
+    control = data.of(apart)
+    errors = *_reading_errors(control, comparison, values), *_rest_errors(control, comparison, values)
     groups = tuple(estimates.by_group(_groups(allowing), design.slot("top_electrode")[0].name))
     return Fit(
         iteration, specimens, seed, tuple(values), tuple(untold), errors, len(names) - len(apart),
         tuple(sorted(apart)), tuple(left_out), _fingerprint(log, (iteration, specimens)), groups=groups,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _FitData:
+    """Measurements that a fit can use.
+
+    Attributes
+    ----------
+    readings : sequence of (str, AllowedValues)
+        Readings along sound electrodes, each with its specimen.
+    measured : sequence of (SpecimenEntries, str)
+        Specimens that the bench or an LCR meter has measured, each with the name of its print.
+    """
+
+    readings: Sequence[tuple[str, AllowedValues]]
+    measured: Sequence[tuple[SpecimenEntries, str]]
+
+    def specimens(self) -> set[str]:
+        """All specimens."""
+        return {name for name, _ in self.readings} | {one.specimen for one, _ in self.measured}
+
+    def of(self, specimens: Container[str]) -> "_FitData":
+        """Data of some specimens."""
+        readings = [each for each in self.readings if each[0] in specimens]
+        return _FitData(readings, [each for each in self.measured if each[0].specimen in specimens])
 
 
 def _groups(allowing: Sequence[tuple[Compared, AllowedValues]]) -> dict[str, list[tuple[AllowedValues, bool]]]:
@@ -144,20 +163,27 @@ def held_back(names: Sequence[str], seed: int, share: float = HELD_BACK) -> froz
 
 
 def _fitted(
-    readings: Sequence[AllowedValues], fits: Sequence[estimates.OfSpecimen], design: Design, seed: int
-) -> tuple[list[Fitted], list[Untold]]:
+    data: _FitData, comparison: Comparison, design: Design, seed: int
+) -> tuple[list[Fitted], list[Untold]]:  # fmt: skip
     """All values and all that stays open; of two values of one quantity the one that is known better."""
+    readings = [reading for _, reading in data.readings]
+    fits = [
+        estimates.of_specimen(one, print_, Movable(comparison.bodies[comparison.names[one.specimen]]))
+        for one, print_ in data.measured
+    ]
     electrode, film = design.slot("top_electrode")[0].name, design.slot("film")[0].name
     results = [
         estimates.resistivity(readings, electrode),
         *estimates.values(fits),
         estimates.leak(readings, film, seed),
     ]
-    values = sorted((one for one in results if isinstance(one, Fitted)), key=lambda one: -one.high / one.low)
-    best = {(one.material, one.quantity): one for one in values}  # the narrowest
-    ordered = {key: best[key] for key in ((r.material, r.quantity) for r in results if isinstance(r, Fitted))}
-    open_ = {u.parameter: u for u in reversed(results) if isinstance(u, Untold) and not _is_told(u, ordered)}
-    return list(ordered.values()), [_ACROSS, *open_.values()]
+    best = dict[tuple[str, str], Fitted]()
+    for one in results:
+        if isinstance(one, Fitted):
+            before = best.get((one.material, one.quantity), one)
+            best[one.material, one.quantity] = min(one, before, key=lambda value: value.high / value.low)
+    open_ = {u.parameter: u for u in reversed(results) if isinstance(u, Untold) and not _is_told(u, best)}
+    return list(best.values()), [_ACROSS, *open_.values()]
 
 
 def _is_told(untold: Untold, values: Iterable[tuple[str, str]]) -> bool:
@@ -173,11 +199,10 @@ def with_values(body: Body, values: Sequence[Fitted]) -> Body:
     return body.with_values(own)
 
 
-def _reading_errors(
-    specimens: Container[str], comparison: Comparison, values: Sequence[Fitted]
-) -> Iterator[Error]:  # fmt: skip
+def _reading_errors(data: _FitData, comparison: Comparison, values: Sequence[Fitted]) -> Iterator[Error]:
     """Residuals of what a fit could have used of some specimens, before and after it."""
     residuals, after = list[tuple[float, float]](), dict[str, Predicted]()
+    specimens = dict(data.readings)
     for row in comparison.rows:
         of = row.predicted
         if of is None or row.reading.specimen not in specimens or not usable(row):
@@ -191,11 +216,11 @@ def _reading_errors(
     yield from _error("R_Y", residuals)
 
 
-def _rest_errors(
-    specimens: Sequence[SpecimenEntries], comparison: Comparison, values: Sequence[Fitted]
-) -> Iterator[Error]:
+def _rest_errors(data: _FitData, comparison: Comparison, values: Sequence[Fitted]) -> Iterator[Error]:
     residuals = list[tuple[float, float]]()
-    for one in specimens:
+    for one, _ in data.measured:
+        if not one.recorded:
+            continue
         body = comparison.bodies[comparison.names[one.specimen]]
         sensors = [Movable(of).model.sensor for of in (body, with_values(body, values))]
         both = [np.abs(one.data.rest - at_rest(sensor, one.model.frequency_hz)) for sensor in sensors]

@@ -19,7 +19,7 @@ from sensorgen.analysis.comparison.expected import PERMITTIVITY, Movable
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.version import __version__
-from sensorgen.design.materials import FILM_LEAK, own
+from sensorgen.design.materials import FILM_LEAK, SourceValue, source_file
 from sensorgen.prediction.calibration.fitting import Posterior, calibrated
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel
 from sensorgen.prediction.inference import standard
@@ -184,12 +184,12 @@ def text(fit: Fit) -> str:
         f"fit of {fit.of}: {fit.specimens} specimens, {len(fit.held_back)} held back (seed "
         f"{fit.seed}); sensorgen {__version__}; data {fit.log[:16]}"
     )
-    materials: dict[str, list[own.SourceValue]] = {}
+    materials: dict[str, list[SourceValue]] = {}
     for one in fit.values:
-        value = own.SourceValue(one.quantity, one.value, one.low, one.high, one.note)
+        value = SourceValue(one.quantity, one.value, one.low, one.high, one.note)
         materials.setdefault(one.material, []).append(value)
     open_ = (f"not determined: {' '.join(f'{untold.parameter}: {untold.why}'.split())}" for untold in fit.untold)
-    return own.written(about, materials, open_)
+    return source_file(about, materials, open_)
 
 
 RESISTIVITY = "resistivity_ohm_m"

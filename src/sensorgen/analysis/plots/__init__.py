@@ -41,17 +41,13 @@ def files(
 
     needed("matplotlib", "plotly")
     answer = results.response(sensor, frequency_hz, force_n, position_mm)
-    drawn = [
-        results.identifiability_figure(sensor, frequency_hz, force_n=force_n[-1], title=title),
-        *results.figures(answer),
-    ]
+    first = results.identifiability_figure(sensor, frequency_hz, force_n=force_n[-1], title=title)
+    drawn = [first, *results.figures(answer)]
     for figure in drawn:
         yield f"{figure.key}.png", static.png(figure)
     words = (
         f"{len(frequency_hz)} frequencies, {force_n[0]:g} to {force_n[-1]:g} N, "
         f"{position_mm[0]:g} to {position_mm[-1]:g} mm, tip {answer.tip_mm:g} mm."
     )
-    yield (
-        PAGE,
-        pages.page(f"{title or 'Sensor'} under load", [words], [pages.PageSection(figures=tuple(drawn))]).encode(),
-    )
+    sections = [pages.PageSection(figures=tuple(drawn))]
+    yield PAGE, pages.page(f"{title or 'Sensor'} under load", [words], sections).encode()

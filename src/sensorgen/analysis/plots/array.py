@@ -26,9 +26,8 @@ def resolution(study: "ArrayStudy", name: str = "array", title: str = "") -> Fig
     panels = [panel(layout, shown, "standard error [kPa]", f"one frame at {study.pressure_kpa:g} kPa", most or nan)]
     if study.crosstalk is not None:
         values = np.where(study.determined, study.crosstalk, np.nan)
-        panels.append(
-            panel(layout, values, "crosstalk [-]", "crosstalk", min(1.0, np.nanmax(values, initial=0.0)) or nan)
-        )
+        worst = min(1.0, np.nanmax(values, initial=0.0)) or nan
+        panels.append(panel(layout, values, "crosstalk [-]", "crosstalk", worst))
     alt = "Standard error of the pressure at every crossing, over the outline; crosstalk beside it."
     words = title or f"{study.model.design.name}, {study.readout.kind}"
     return Figure(name, words, alt, {"": tuple(panels)}, columns=len(panels))

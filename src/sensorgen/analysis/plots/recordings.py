@@ -6,6 +6,7 @@ and position (6.30 to 6.32), and normalised differences of several recordings (6
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,9 +28,10 @@ from sensorgen.analysis.plots.figure import (
 from sensorgen.analysis.plots.pages import PageSection, page
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.signal.presses import Pairs, Surface, normalised, surface
-from sensorgen.measure.signal.run import Hysteresis
-from sensorgen.measure.signal.schedule import Step
+
+if TYPE_CHECKING:
+    from sensorgen.measure.signal.presses import Pairs, Step
+    from sensorgen.measure.signal.run import Hysteresis
 
 PARTS = {"resistance": ("R", "real"), "reactance": ("X", "imag")}
 _TIME, _FORCE, _POSITION = Axis("time [s]"), Axis("force [N]"), Axis("position [mm]")
@@ -59,7 +61,7 @@ class DrawnRecording:
     raw_ohm: Complex
     filtered_s: Real
     filtered_ohm: Complex
-    pairs: Pairs | None
+    pairs: "Pairs | None"
 
 
 def series(run: DrawnRecording, key: str = "time") -> Figure:
@@ -89,11 +91,6 @@ def _line(name: str, time_s: Real, values: Real, colour: str) -> Curve:
     return Curve("line", name, time_s[at], values[at], colour=colour)
 
 
-def difference_surface(pairs: Pairs, part: str) -> Surface:
-    """Change of "resistance" or "reactance" by the loads, over force and position [ohm]."""
-    return surface(pairs.force_n, pairs.position_mm, getattr(pairs.difference_ohm, PARTS[part][1]))
-
-
 def differences(run: DrawnRecording, part: str, key: str = "") -> Figure:
     """Change of "resistance" or "reactance" by the loads over force and position, at each frequency.
 
@@ -102,10 +99,12 @@ def differences(run: DrawnRecording, part: str, key: str = "") -> Figure:
     BadInput
         As :func:`sensorgen.measure.signal.presses.surface`; no loads.
     """
-    pairs = run.pairs
+    from sensorgen.measure.signal.presses import surface
+
+    pairs, (symbol, share) = run.pairs, PARTS[part]
     if pairs is None:
         raise BadInput(f"{run.name}: no loads of known force")
-    through, symbol = difference_surface(pairs, part), PARTS[part][0]
+    through = surface(pairs.force_n, pairs.position_mm, getattr(pairs.difference_ohm, share))
 
     def panels(k: int, at: str) -> Iterator[Panel]:
         divisor, unit = scale(through.values[..., k], "Ω")
@@ -120,7 +119,7 @@ def differences(run: DrawnRecording, part: str, key: str = "") -> Figure:
 
 
 def compared(
-    runs: Mapping[str, Pairs], tones_hz: Real, *, together: bool = False, key: str = "normalised", left_out: str = ""
+    runs: "Mapping[str, Pairs]", tones_hz: Real, *, together: bool = False, key: str = "normalised", left_out: str = ""
 ) -> Figure:
     """Differences of several recordings on one scale from 0 to 1, over force, R and X at each frequency.
 
@@ -137,6 +136,8 @@ def compared(
     left_out : str
         Sentence on recordings that are not drawn.
     """
+    from sensorgen.measure.signal.presses import normalised
+
     parts = {
         symbol: normalised([getattr(pairs.difference_ohm, part) for pairs in runs.values()], together=together)
         for symbol, part in PARTS.values()
@@ -156,11 +157,10 @@ def compared(
         f"Change of R and of X by each load of {len(runs)} recordings over its force: 0 is the least and 1 the largest "
         f"change ({how}).{left_out}"
     )
-    title = f"Normalised differences under load, {how}"
-    return Figure.by_frequency(key, title, alt, tones_hz, panels, columns=2)
+    return Figure.by_frequency(key, f"Normalised differences under load, {how}", alt, tones_hz, panels, columns=2)
 
 
-def hysteresis(loads: Mapping[float, Hysteresis], tones_hz: Real, name: str) -> Figure:
+def hysteresis(loads: "Mapping[float, Hysteresis]", tones_hz: Real, name: str) -> Figure:
     """Change of R and X under rising (solid) and falling force (dashed), at the first and the last frequency.
 
     Parameters
@@ -189,7 +189,7 @@ def hysteresis(loads: Mapping[float, Hysteresis], tones_hz: Real, name: str) -> 
     return Figure.by_frequency("hysteresis", title, alt, tones_hz[ends], panels, columns=2)
 
 
-def schedule(steps: Sequence[Step], seconds: float) -> Figure:
+def schedule(steps: "Sequence[Step]", seconds: float) -> Figure:
     """Plan of a run: force over position in the order of the run, and force over time."""
     force, position = np.array([s.force_n for s in steps]), np.array([s.position_mm for s in steps])
     order = Map(position, force, np.arange(1.0, len(steps) + 1), "load")

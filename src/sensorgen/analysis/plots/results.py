@@ -479,9 +479,8 @@ def inverse(of: ResponseMap, which: str) -> Figure:
         yield Panel(content, Axis(f"R [{r_unit}]"), Axis(f"X [{x_unit}]"), title=at)
 
     folds = "; red: folds" if of.folds().any() else ""
-    solid, dashed = (
-        ", ".join(f"{v:.3g}" for v in values) for values in (of.force_n[forces], of.position_mm[positions])
-    )
+    lines = of.force_n[forces], of.position_mm[positions]
+    solid, dashed = (", ".join(f"{v:.3g}" for v in values) for values in lines)
     title = f"{which.capitalize()} from R and X\nsolid lines: {solid} N; dashed: {dashed} mm{folds}"
     alt = (
         f"{which.capitalize()} in colours over R and X. Lines of constant force are solid, of constant position dashed."

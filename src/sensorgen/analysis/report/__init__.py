@@ -12,22 +12,32 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
-from typing import Annotated, Any
+from math import nan
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sensorgen.analysis.comparison import UNTRUSTED, Comparison, known_iterations, of_iteration
 from sensorgen.analysis.comparison.measured import RecordedRun, runs
 from sensorgen.analysis.plots import pages
-from sensorgen.analysis.plots.figure import Figure
-from sensorgen.analysis.plots.pages import PageSection
-from sensorgen.analysis.report import alternating, electrodes, explained, history, recordings, variants, yields
-from sensorgen.core.document import Column, Part, Table, plain, safe, spreadsheet
+from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, BodyTriangles, Curve, Figure, Panel
+from sensorgen.analysis.plots.pages import Drawing, PageSection
+from sensorgen.analysis.report import alternating, electrodes, explained, history, recordings, yields
+from sensorgen.checks.review import draw
+from sensorgen.core.document import Column, Table, plain, safe, spreadsheet
 from sensorgen.core.document import markdown as document
 from sensorgen.core.errors import BadInput
+from sensorgen.core.units import M_PER_MM
 from sensorgen.core.version import __version__
+from sensorgen.design.design import Design
 from sensorgen.design.materials import SET, citations
 from sensorgen.measure.log import Anchor, Log, RawFile
 from sensorgen.measure.log.notes import specimen as named
-from sensorgen.prediction.calibration.calibration import Calibration
+from sensorgen.prediction.identifiability.results import Identifiability, StandardErrors
+from sensorgen.prediction.query import FORCE_N
+from sensorgen.prediction.slices import reviewed
+from sensorgen.scene.geometry.meshes import mesh
+
+if TYPE_CHECKING:
+    from sensorgen.prediction.calibration.calibration import Calibration
 
 LIBRARIES = ("numpy", "scipy", "plotly", "matplotlib", "jinja2")
 
@@ -172,30 +182,59 @@ def report(
     if not comparison.rows and not recorded:
         raise _nothing(log, ", ".join(specimens) or f"iteration {iteration}", left_out)
     step("residuals")
-    names = {row.reading.specimen for row in comparison.rows} | {run.entry.specimen for run in recorded}
-    calibrated = history.latest(log, names, left_out)
-    explanations = _explanations(comparison, recorded, calibrated)
+    data = _data(log, comparison, recorded, left_out)
+    step("variants")
+    sections = tuple(s for s in _sections(log, data) if any((s.tables, s.figures, s.drawings)))
+    step("page")
+    made_at = datetime.now(UTC).isoformat(timespec="seconds")
+    return Report(iteration, specimens, made_at, _headline(data), _findings(data), sections)
+
+
+@dataclass(frozen=True, eq=False)
+class _ReportData:
+    """Everything that a report shows."""
+
+    comparison: Comparison
+    recorded: Sequence[RecordedRun]
+    explanations: Sequence[explained.Explanation]
+    impedances: Table | None
+    ac: Sequence[alternating.AcRow]
+    changes: Sequence[history.HistoryRow]
+    calibrated: "Sequence[Calibration]"
+    left_out: Sequence[tuple[str, str]]
+
+
+def _data(
+    log: Log, comparison: Comparison, recorded: Sequence[RecordedRun], left_out: list[tuple[str, str]]
+) -> _ReportData:  # fmt: skip
+    calibrated = history.latest(log, _specimens(comparison, recorded), left_out)
+    own = {one.specimen for one in calibrated}  # a calibration explains more of its recordings than one parameter can
+    explanations = explained.explanations(comparison, [run for run in recorded if run.entry.specimen not in own])
     impedances = recordings.impedances(recorded, comparison) if recorded else None
     ac = alternating.rows(comparison)
     changes = history.rows(comparison, ac)
-    headline = (
-        *electrodes.headline(comparison), *yields.headline(comparison), *alternating.headline(ac),
-        *_untrusted(left_out),
+    return _ReportData(comparison, recorded, explanations, impedances, ac, changes, calibrated, left_out)
+
+
+def _specimens(comparison: Comparison, recorded: Sequence[RecordedRun]) -> set[str]:
+    return {row.reading.specimen for row in comparison.rows} | {run.entry.specimen for run in recorded}
+
+
+def _headline(data: _ReportData) -> tuple[str, ...]:
+    return (
+        *electrodes.headline(data.comparison), *yields.headline(data.comparison), *alternating.headline(data.ac),
+        *_untrusted(data.left_out), *recordings.headline(data.impedances), *_basis(data.comparison, data.recorded),
     )  # fmt: skip
-    findings = (
-        *history.calibration_findings(calibrated), *yields.findings(comparison),
-        *yields.direction_findings(comparison), *history.findings(changes), *alternating.findings(ac),
+
+
+def _findings(data: _ReportData) -> tuple[str, ...]:
+    comparison = data.comparison
+    return (
+        *history.calibration_findings(data.calibrated), *yields.findings(comparison),
+        *yields.direction_findings(comparison), *history.findings(data.changes), *alternating.findings(data.ac),
         *alternating.behind_leak(comparison), *electrodes.beyond_meter(comparison),
-        *recordings.findings(recorded, impedances), *explained.sentences(explanations),
+        *recordings.findings(data.recorded, data.impedances), *explained.sentences(data.explanations),
         *electrodes.findings(comparison),
-    )  # fmt: skip
-    step("variants")
-    sections = list(_sections(log, comparison, recorded, explanations, impedances, ac, changes, calibrated, left_out))
-    step("page")
-    return Report(
-        iteration, specimens, datetime.now(UTC).isoformat(timespec="seconds"),
-        (*headline, *recordings.headline(impedances), *_basis(comparison, recorded)), findings,
-        tuple(s for s in sections if any((s.tables, s.figures, s.drawings))),
     )  # fmt: skip
 
 
@@ -208,10 +247,10 @@ def _untrusted(left_out: Sequence[tuple[str, str]]) -> Iterator[str]:
 
 def _basis(comparison: Comparison, recorded: Sequence[RecordedRun]) -> Iterator[str]:
     """Summary of the measurements, in one sentence; none of a single reading."""
-    specimens = {row.reading.specimen for row in comparison.rows} | {run.entry.specimen for run in recorded}
     if len(comparison.rows) + len(recorded) > 1:
+        specimens = len(_specimens(comparison, recorded))
         yield (
-            f"Basis: {len(comparison.rows)} readings and {len(recorded)} recordings; specimens: {len(specimens)}; "
+            f"Basis: {len(comparison.rows)} readings and {len(recorded)} recordings; specimens: {specimens}; "
             f"designs: {len(comparison.predictions)}."
         )
 
@@ -225,57 +264,30 @@ def _nothing(log: Log, of: str, left_out: Sequence[tuple[str, str]]) -> BadInput
     )
 
 
-def _explanations(
-    comparison: Comparison, recorded: Sequence[RecordedRun], calibrated: Sequence[Calibration]
-) -> list[explained.Explanation]:  # fmt: skip
-    """Effect of each parameter; a calibration explains more of its specimen's recordings than one parameter can."""
-    own = {one.specimen for one in calibrated}
-    return explained.explanations(comparison, [run for run in recorded if run.entry.specimen not in own])
-
-
-def _sections(
-    log: Log, comparison: Comparison, recorded: Sequence[RecordedRun], explanations: Sequence[explained.Explanation],
-    impedances: Table | None, ac: Sequence[alternating.AcRow], changes: Sequence[history.HistoryRow],
-    calibrated: Sequence[Calibration], left_out: Sequence[tuple[str, str]],
-) -> Iterator[PageSection]:  # fmt: skip
-    alone = len(comparison.rows) <= 1 and not recorded  # a short page
-    figures = (*electrodes.figures(comparison), *(recordings.residuals(impedances) if impedances else ()))
-    tables = (*([electrodes.readings(comparison)] if comparison.direct else ()), *([impedances] if impedances else ()))
-    parts: tuple[Part, ...]
-    notes: tuple[str, ...] = electrodes.NOTES if comparison.direct and not alone else ()
-    yield PageSection("measured", "Measured and predicted", figures, (*tables, *notes))
-    if ac:
-        parts = (alternating.table(ac), alternating.NOTE)
-        yield PageSection("ac", "Capacitance and impedance by frequency", tuple(alternating.figures(ac)), parts)
-    if comparison.direct:
-        grouped = (
-            yields.table(comparison) if len(comparison.last) > 1 else None,
-            yields.direction_table(comparison),
-        )
-        notes = () if alone else yields.notes(comparison)
-        parts = (*filter(None, grouped), electrodes.reasons(comparison), *notes)
-        yield PageSection("verdicts", "Verdicts and yield", yields.figures(comparison), parts)
-    if changes:
-        notes = () if alone else (history.NOTE,)
-        yield PageSection("changes", "Bake, shrinkage and defects", (), (history.table(changes), *notes))
-    if explanations:
-        parts = (explained.table(explanations), explained.NOTE)
-        yield PageSection("explained-by", "Which parameter explains the residuals", (), parts)
-    if calibrated:
-        parts = (history.calibration_table(calibrated), history.CALIBRATION_NOTE)
-        yield PageSection("calibrated", "Calibrated specimens", (), parts)
-    if recorded:
-        figures = tuple(recordings.figures(recorded))
-        yield PageSection("recorded", "Recordings", figures, (recordings.facts(recorded),))
-    figures = () if alone else tuple(variants.figures(comparison))
-    yield PageSection(
-        "variants", "The variants", figures, variants.identifiability(comparison), variants.drawings(comparison)
-    )
-    if left_out:
+def _sections(log: Log, data: _ReportData) -> Iterator[PageSection]:
+    """All sections in order; those without tables, figures and drawings are not shown."""
+    comparison, recorded = data.comparison, data.recorded
+    brief = len(comparison.rows) <= 1 and not recorded
+    direct = [electrodes.readings(comparison)] if comparison.direct else []
+    at_rest = [data.impedances] if data.impedances else []
+    notes = electrodes.NOTES if direct and not brief else ()
+    figures = (*electrodes.figures(comparison), *recordings.residuals(data.impedances))
+    yield PageSection("measured", "Measured and predicted", figures, (*direct, *at_rest, *notes))
+    figures = tuple(alternating.figures(data.ac))
+    yield PageSection("ac", "Capacitance and impedance by frequency", figures, alternating.parts(data.ac))
+    verdicts = yields.parts(comparison, brief=brief)
+    yield PageSection("verdicts", "Verdicts and yield", yields.figures(comparison), verdicts)
+    yield PageSection("changes", "Bake, shrinkage and defects", (), history.parts(data.changes, brief=brief))
+    yield PageSection("explained-by", "Which parameter explains the residuals", (), explained.parts(data.explanations))
+    yield PageSection("calibrated", "Calibrated specimens", (), history.calibration_parts(data.calibrated))
+    yield PageSection("recorded", "Recordings", tuple(recordings.figures(recorded)), recordings.facts(recorded))
+    figures = () if brief else tuple(_variants(comparison))
+    yield PageSection("variants", "The variants", figures, identifiability(comparison), _drawings(comparison))
+    if data.left_out:
         caption = "What was left out, or taken with care, and why"
-        parts = (Table.of("left_out", caption, tuple(LeftOut(*row) for row in left_out)),)
-        yield PageSection("left-out", "What was left out, and why", parts=parts)
-    yield PageSection("provenance", "Provenance", parts=(origins(log, comparison, brief=alone),))
+        omitted = Table.of("left_out", caption, tuple(LeftOut(*row) for row in data.left_out))
+        yield PageSection("left-out", "What was left out, and why", parts=(omitted,))
+    yield PageSection("provenance", "Provenance", parts=(origins(log, comparison, brief=brief),))
 
 
 def html(report: Report) -> Iterator[str]:
@@ -362,3 +374,103 @@ def written(content: Report, how: str) -> str:
 
 _WRITERS = {"html": html, "md": markdown, "csv": comma_separated, "json": as_json}
 FORMATS = tuple(_WRITERS)
+
+
+_STRETCH = (1.0, 1.0, 10.0)
+
+
+@dataclass(frozen=True)
+class IdentifiabilityRow:
+    """Least standard errors of force and position of a design, and the verdict."""
+
+    design: Annotated[str, Column("design")]
+    force_n: Annotated[float, Column("error of force, perfect model", "N")]
+    position_mm: Annotated[float, Column("error of position, perfect model", "mm")]
+    correlation: Annotated[float, Column("correlation")]
+    bench_n: Annotated[float, Column("error of force, after 30 known presses", "N")]
+    bench_mm: Annotated[float, Column("error of position, after 30 known presses", "mm")]
+    verdict: Annotated[str, Column("verdict")]
+
+
+def _drawings(comparison: Comparison) -> tuple[Drawing, ...]:
+    """Every variant of which a specimen was printed, with its prediction in words."""
+    sheets = []
+    for name, body in comparison.bodies.items():
+        of, design = comparison.predictions[name], body.design
+        r, c = of.ry_ohm, of.prediction.capacitance
+        words = (
+            f"electrode resistance {r.words() if r else 'unknown'}",
+            f"capacitance {c.words()}" if c else f"no capacitance: {of.reason}",
+            of.provenance,
+        )
+        sheets.append(Drawing(name, design.id(), draw(design, reviewed(design)), "; ".join(words)))
+    return tuple(sheets)
+
+
+def identifiability(comparison: Comparison) -> tuple[Table, ...]:
+    """A row for each variant with a prediction."""
+    rows = []
+    for name, of in comparison.predictions.items():
+        card = of.prediction.identifiability
+        force, place, together = _known(card)
+        bench_force, bench_place, _ = _known(card and card.calibrated)
+        verdict = card.verdict if card else of.reason or "no prediction"
+        rows.append(IdentifiabilityRow(name, force, place, together, bench_force, bench_place, verdict))
+    caption = f"Standard errors of {FORCE_N:g} N in the middle, predicted, by seven frequencies (Cramér-Rao)"
+    return (Table.of("identifiability", caption, rows),) if rows else ()
+
+
+def _known(of: StandardErrors | None) -> tuple[float, float, float]:
+    """Standard errors of force [N] and position [mm], and their correlation; nan where unknown."""
+    values = (of.sigma_force_n, of.sigma_position_m, of.correlation) if of else (None, None, None)
+    force, place, together = (nan if value is None else value for value in values)
+    return force, place / M_PER_MM, together
+
+
+def _variants(comparison: Comparison) -> Iterator[Figure]:
+    """Standard errors over position for three forces, and the bodies; of every variant, one at a time."""
+    cards = {name: of.prediction.identifiability for name, of in comparison.predictions.items()}
+    known = {name: errors(card) for name, card in cards.items() if card}
+    if known:
+        yield Figure(
+            "identifiability-map", "Predicted standard errors of force and position",
+            "Least standard error (Cramér-Rao) of force above, of position below, over the position of the load, for "
+            "the frequencies and noise of the prediction. Dashed: required. Gaps: undefined.", known, "variant",
+        )  # fmt: skip
+    if comparison.bodies:
+        axes = Axis("x [mm]"), Axis("y [mm]"), Axis("z [mm]")
+        yield Figure(
+            "bodies", f"Bodies, height x {_STRETCH[2]:g}",
+            "The bodies of the chosen variant, to be turned with the mouse, their height enlarged. The drawings show "
+            "them in section.",
+            {name: (Panel(tuple(_bodies(body.design)), *axes),) for name, body in comparison.bodies.items()}, "variant",
+            stretch=_STRETCH,
+        )  # fmt: skip
+
+
+def errors(card: Identifiability) -> tuple[Panel, Panel]:
+    """Standard errors over position [mm], for a weak, a middling and the greatest force."""
+    over, required = card.map, card.required
+    place, panels = [x / M_PER_MM for x in over.position_m], []
+    for quantity, unit, sigma, needed, per in (
+        ("force", "N", over.sigma_force_n, required.sigma_force_n, 1.0),
+        ("position", "mm", over.sigma_position_m, required.sigma_position_m, M_PER_MM),
+    ):
+        curves = [
+            Curve("line", f"{over.force_n[k]:g} N", place, [nan if v is None else v / per for v in sigma[k]],
+                  colour=colour)
+            for k, colour in zip((1, len(sigma) // 2, len(sigma) - 1), (SKY, BLUE, ORANGE), strict=True)
+        ]  # fmt: skip
+        need = [nan if needed is None else needed / per] * 2
+        curves.append(Curve("line", "required", [place[0], place[-1]], need, colour=GREY, dash="dash"))
+        y = Axis(f"error of {quantity} [{unit}]", log=True)
+        panels.append(Panel(tuple(curves), Axis("position of the tip's centre [mm]"), y))
+    return panels[0], panels[1]
+
+
+def _bodies(design: Design) -> Iterator[BodyTriangles]:
+    """The bodies of the sensor in use, as triangles."""
+    for body in design.in_use.bodies:
+        body_mesh = mesh(body)
+        name, colour = body.name.replace("_", " "), design.material(body.material).colour
+        yield BodyTriangles(name, body_mesh.vertices_mm, body_mesh.triangles, colour)

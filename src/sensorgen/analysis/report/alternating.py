@@ -11,7 +11,7 @@ from typing import Annotated
 from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.comparison.expected import Predicted
 from sensorgen.analysis.plots.figure import BLUE, GREY, Axis, Curve, Figure, Panel
-from sensorgen.core.document import Cell, Column, Table, some
+from sensorgen.core.document import Cell, Column, Part, Table, some
 from sensorgen.core.units import frequency_text
 from sensorgen.measure import accuracy
 from sensorgen.measure.log import Reading
@@ -114,9 +114,10 @@ def _predicted(of: Predicted | None, frequency_hz: float) -> tuple[_Range, _Rang
     return (c, min(by.lower, c), max(by.upper, c)), (abs(z[0]), min(low, abs(z[0])), max(high, abs(z[0])))
 
 
-def table(rows: Sequence[AcRow]) -> Table:
-    """The rows as a table."""
-    return Table.of("ac", "AC readings and their prediction as printed, by frequency", tuple(rows))
+def parts(rows: Sequence[AcRow]) -> tuple[Part, ...]:
+    """The rows as a table, and a note; nothing without rows."""
+    caption = "AC readings and their prediction as printed, by frequency"
+    return (Table.of("ac", caption, tuple(rows)), NOTE) if rows else ()
 
 
 def _compared(rows: Sequence[AcRow]) -> list[AcRow]:

@@ -5,10 +5,11 @@ frequency, complex where Z is. One parameter is moved for all of them until :mat
 the part of that sum that it takes away.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from itertools import groupby
 from math import exp, inf, log, nan, sqrt
 from typing import Annotated, Any
 
@@ -19,7 +20,7 @@ from sensorgen.analysis.comparison.expected import Movable, at_rest, moved, pres
 from sensorgen.analysis.comparison.measured import RecordedRun
 from sensorgen.analysis.report.electrodes import usable
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.core.document import Column, Table
+from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.measure.signal.verdicts import INTACT_OHM, across_ohm
@@ -76,23 +77,28 @@ def explanations(comparison: Comparison, recorded: Sequence[RecordedRun]) -> lis
     ]  # fmt: skip
 
 
-def table(explanations: Sequence[Explanation]) -> Table:
-    """A row for each."""
-    return Table.of("explained", "Share of the residuals that one parameter explains", tuple(explanations))
+def parts(explanations: Sequence[Explanation]) -> tuple[Part, ...]:
+    """A row for each, and a note; nothing without any."""
+    caption = "Share of the residuals that one parameter explains"
+    return (Table.of("explained", caption, tuple(explanations)), NOTE) if explanations else ()
 
 
 def sentences(explanations: Sequence[Explanation]) -> Iterator[str]:
     """The best parameter of each kind, and those that the readings cannot constrain."""
-    for kind in dict.fromkeys(e.kind for e in explanations):
-        best = next(e for e in explanations if e.kind == kind)
+    for kind, of_kind in groupby(explanations, key=lambda e: e.kind):
+        best = next(of_kind)
         if best.share_percent > 100 * _FLAT:
             by = f"of {best.value:.3g} S" if best.parameter == LEAK else f"scaled by {best.value:.3g}"
             share = f"{best.share_percent:.3g} % of the squared residuals"
             yield f"{kind.capitalize()}: {best.parameter} {by} explains {share}."
-    loud = {e.parameter for e in explanations if not e.share_percent <= 100 * _FLAT}
-    silent = [p for p in PARAMETERS if p not in loud]
-    if silent and explanations:
-        yield f"These readings cannot constrain {', '.join(silent[:-1])}{' or ' if silent[1:] else ''}{silent[-1]}."
+    if explanations:
+        yield from _unconstrained({e.parameter for e in explanations if not e.share_percent <= 100 * _FLAT})
+
+
+def _unconstrained(constrained: Container[str]) -> Iterator[str]:
+    *first, last = ["", *(p for p in PARAMETERS if p not in constrained)]
+    if last:
+        yield f"These readings cannot constrain {' or '.join(filter(None, (', '.join(first[1:]), last)))}."
 
 
 def _resistances(comparison: Comparison) -> Iterator[MeasurementKind]:
@@ -143,6 +149,7 @@ def _of_electrodes(middles: Real, law: Callable[[float, str, float], float]) -> 
 def _impedances(comparison: Comparison, recorded: Sequence[RecordedRun]) -> Iterator[MeasurementKind]:
     """Z at rest, and its change under load, where a line can be made of the design."""
     known: list[tuple[RecordedRun, Movable]] = []
+    loaded, changes = list[tuple[RecordedRun, Movable]](), list[Complex]()
     for run in recorded:
         name = comparison.names.get(run.entry.specimen)
         if name is not None and np.isfinite(run.rest_ohm).all():
@@ -150,13 +157,14 @@ def _impedances(comparison: Comparison, recorded: Sequence[RecordedRun]) -> Iter
             with suppress(SensorgenError):
                 _ = of.model.sensor
                 known.append((run, of))
+                if run.pairs is not None:
+                    loaded.append((run, of))
+                    changes.append(np.log(run.pairs.pressed_ohm / run.pairs.before_ohm).ravel())
     if known:
         rest = np.concatenate([np.log(run.rest_ohm) for run, _ in known])
         yield MeasurementKind("impedance at rest", rest, partial(_modelled, known, loaded=False))
-    loaded = [(run, of) for run, of in known if run.pairs is not None]
     if loaded:
-        measured = [np.log(r.pairs.pressed_ohm / r.pairs.before_ohm).ravel() for r, _ in loaded if r.pairs]
-        yield MeasurementKind("impedance under load", np.concatenate(measured), partial(_modelled, loaded, loaded=True))
+        yield MeasurementKind("impedance under load", np.concatenate(changes), partial(_modelled, loaded, loaded=True))
 
 
 def _modelled(known: Sequence[tuple[RecordedRun, Movable]], parameter: str, value: float, *, loaded: bool) -> Complex:

@@ -3,15 +3,17 @@
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.report.alternating import BAKED, AcRow, at_text
-from sensorgen.core.document import Cell, Column, Table
+from sensorgen.core.document import Cell, Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log import Log
-from sensorgen.prediction.calibration.calibration import Calibration, from_json
+
+if TYPE_CHECKING:
+    from sensorgen.prediction.calibration.calibration import Calibration
 
 CALIBRATION_NOTE = (
     "Ratios of a calibrated specimen to its prediction, with intervals in the JSON of `sensorgen calibrate`. Covered: "
@@ -36,24 +38,27 @@ class CalibrationRow:
     position_width_mm: Annotated[float | None, Column("width of position", "mm", "median of the intervals", digits=3)]
 
 
-def latest(log: Log, specimens: Container[str], left_out: list[tuple[str, str]]) -> list[Calibration]:
+def latest(log: Log, specimens: Container[str], left_out: list[tuple[str, str]]) -> "list[Calibration]":
     """The latest calibration of each specimen; those that cannot be read go to ``left_out``."""
     rows = {row.specimen: row for row in log.entries(Row) if row.specimen in specimens}
     calibrated = []
-    for name, row in rows.items():
+    for row in rows.values():
+        from sensorgen.prediction.calibration.calibration import from_json
+
         try:
             calibrated.append(from_json(row.data))
         except BadInput as error:
-            left_out.append((f"calibration {row.number}, {name}", str(error)))
+            left_out.append((f"calibration {row.number}, {row.specimen}", str(error)))
     return calibrated
 
 
-def calibration_table(calibrations: Sequence[Calibration]) -> Table:
-    """A row for each."""
-    return Table.of("calibrations", "Specimens by their calibration", [_calibration_row(one) for one in calibrations])
+def calibration_parts(calibrations: "Sequence[Calibration]") -> tuple[Part, ...]:
+    """A row for each, and a note; nothing without any."""
+    rows = [_calibration_row(one) for one in calibrations]
+    return (Table.of("calibrations", "Specimens by their calibration", rows), CALIBRATION_NOTE) if rows else ()
 
 
-def _calibration_row(one: Calibration) -> CalibrationRow:
+def _calibration_row(one: "Calibration") -> CalibrationRow:
     values, held_out, sensor = {v.name: v.value for v in one.values()}, one.held_out, one.model.sensor
     return CalibrationRow(
         one.specimen, one.design, one.posterior.presses, values["resistance"] / sensor.resistance_ohm(),
@@ -64,7 +69,7 @@ def _calibration_row(one: Calibration) -> CalibrationRow:
     )  # fmt: skip
 
 
-def calibration_findings(calibrations: Sequence[Calibration]) -> Iterator[str]:
+def calibration_findings(calibrations: "Sequence[Calibration]") -> Iterator[str]:
     """One sentence for each specimen."""
     for one in calibrations:
         row = _calibration_row(one)
@@ -79,7 +84,6 @@ NOTE = (
     "prediction. The bake shrinks a sensor in its plane: a share s takes C to (1 - s)^2 of it, and leaves the "
     "resistance along the electrodes. A defect's change holds whatever else happened between the two readings."
 )
-_Before = tuple[Compared, dict[float, float]]  # the reading before, and C by frequency in its state [pF]
 _UNTOLD = None, "", ""  # bake, defects and remark of a reading of which none is known
 
 
@@ -107,18 +111,18 @@ def rows(comparison: Comparison, ac: Sequence[AcRow]) -> list[HistoryRow]:
     measured: dict[int, dict[float, tuple[float, float]]] = {}
     for one in ac:
         measured.setdefault(one.number, {})[one.frequency_hz] = one.c_pf, one.c_ratio
-    listed, before = [], dict[str, _Before]()
+    listed, before = [], dict[str, tuple[Compared, dict[float, float]]]()  # the reading before, C in its state [pF]
     for row in comparison.rows:
         name = row.reading.specimen
         body = comparison.bodies.get(comparison.names.get(name, ""))
         shrinkage = body.design.shrinkage if body else 0.0
-        earlier, c = before.get(name), measured.get(row.reading.number, {})
-        state = _state(row)
-        known = (state != _UNTOLD or shrinkage) and not (earlier and state == _state(earlier[0]))
-        if known:
-            listed.append(_row(row, earlier, c, shrinkage))
-        c_before = earlier[1] if earlier and not known else {}
-        before[name] = row, {**c_before, **{f: pf for f, (pf, _) in c.items()}}
+        was, c_pf = before.get(name, (None, dict[float, float]()))
+        c, state = measured.get(row.reading.number, {}), _state(row)
+        if (state != _UNTOLD or shrinkage) and (was is None or state != _state(was)):
+            change = _since(row, was, c_pf, c) if was else _by_prediction(row, c)
+            listed.append(_row(row, change, shrinkage))
+            c_pf = {}
+        before[name] = row, c_pf | {f: pf for f, (pf, _) in c.items()}
     return listed
 
 
@@ -127,10 +131,8 @@ def _state(row: Compared) -> tuple[bool | None, str, str]:
     return words.baked, words.defects, words.remark
 
 
-def _row(
-    row: Compared, earlier: _Before | None, c: dict[float, tuple[float, float]], shrinkage: float
-) -> HistoryRow:  # fmt: skip
-    words, change = row.reading.words, _since(row, *earlier, c) if earlier else _by_prediction(row, c)
+def _row(row: Compared, change: "_Change", shrinkage: float) -> HistoryRow:
+    words = row.reading.words
     lowest, bake = min(change.c, default=None), "" if words.baked is None else BAKED[words.baked]
     return HistoryRow(
         row.reading.number, row.reading.specimen, bake, 100 * shrinkage or None, words.defects,
@@ -184,6 +186,7 @@ def findings(rows: Sequence[HistoryRow]) -> Iterator[str]:
             yield f"Reading {row.number} ({state}) against {row.against}: {changed}{shrunk}."
 
 
-def table(rows: Sequence[HistoryRow]) -> Table:
-    """The rows as a table."""
-    return Table.of("changes", "Bake, shrinkage and defects, and the change that they made", tuple(rows))
+def parts(rows: Sequence[HistoryRow], *, brief: bool) -> tuple[Part, ...]:
+    """The rows as a table, with a note unless it is to be brief; nothing without rows."""
+    caption = "Bake, shrinkage and defects, and the change that they made"
+    return (Table.of("changes", caption, tuple(rows)), *([] if brief else [NOTE])) if rows else ()

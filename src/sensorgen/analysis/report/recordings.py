@@ -102,16 +102,16 @@ def _predicted(of: Bounds | None) -> tuple[float | None, float | None, float | N
     return (of.value, of.lower, of.upper) if of else (None, None, None)
 
 
-def facts(recorded: Sequence[RecordedRun]) -> Table:
-    """A row for each recording."""
-    rows = (
+def facts(recorded: Sequence[RecordedRun]) -> tuple[Table, ...]:
+    """A row for each recording; no table without any."""
+    rows = tuple(
         RecordingRow(
             run.name, run.source.file, run.source.format, run.source.program, run.samples, run.valid, run.seconds,
             run.source.rate_hz, len(run.pairs.time_s) if run.pairs else 0, "; ".join(run.notes),
         )
         for run in recorded
     )  # fmt: skip
-    return Table.of("recordings", "Recordings of the rig", tuple(rows))
+    return (Table.of("recordings", "Recordings of the rig", rows),) if rows else ()
 
 
 def headline(table: Table | None) -> Iterator[str]:
@@ -166,9 +166,9 @@ def _outside(rows: Sequence[ImpedanceRow], part: str) -> Iterator[str]:
             yield at_text(row.frequency_hz)
 
 
-def residuals(table: Table) -> Iterator[Figure]:
+def residuals(table: Table | None) -> Iterator[Figure]:
     """Of R and X, relative to the prediction's magnitude."""
-    rows = [row for row in table.rows if row.r_residual is not None]
+    rows = [row for row in table.rows if row.r_residual is not None] if table else []
     if not rows:
         return
     x, names = [row.frequency_hz for row in rows], [row.recording for row in rows]
@@ -189,8 +189,7 @@ def figures(recorded: Sequence[RecordedRun]) -> Iterator[Figure]:
     """Differences of all recordings on a scale of their own, then each recording over time and over loads."""
     yield from compared(recorded)
     for run in recorded:
-        part = f"-{run.source.part}" if run.source.part else ""
-        key = f"{run.entry.number}-{run.source.lockin}{part}"
+        key = f"{run.entry.number}-{run.source.lockin}" + f"-{run.source.part}" * bool(run.source.part)
         yield plots.series(run, f"series-{key}")
         for part in plots.PARTS:
             try:

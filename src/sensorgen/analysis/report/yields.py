@@ -9,10 +9,9 @@ from typing import Annotated
 from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.plots.figure import BLUE, BROWN, GREY, MOST_POINTS, PURPLE, Axis, Curve, Figure, Panel
 from sensorgen.analysis.report.alternating import BAKED
-from sensorgen.analysis.report.electrodes import VERDICT_COLOURS, usable
-from sensorgen.core.document import Cell, Column, Table
-from sensorgen.measure.signal.verdicts import ORDER, REACTANCES, WORDS, Evidence
-from sensorgen.measure.signal.yields import CountShare, Group, dependence, groups
+from sensorgen.analysis.report.electrodes import VERDICT_COLOURS, reasons, usable
+from sensorgen.core.document import Cell, Column, Part, Table
+from sensorgen.measure.signal.verdicts import ORDER, REACTANCES, WORDS, CountShare, Evidence, Group, dependence, groups
 from sensorgen.prediction.query import TONES_HZ
 
 _LOOKS = {  # none with the colour of a verdict
@@ -124,18 +123,18 @@ def findings(comparison: Comparison) -> Iterator[str]:
             f"Without those shorted by design: {whole.shorted.count} of {whole.shorted.total}, {_range(whole.shorted)} "
             "of such prints, 95 % confidence."
         )
+    yield from _differences(comparison)
+
+
+def _differences(comparison: Comparison) -> Iterator[str]:
+    """Shares of the groups of each kind, and whether they differ; nothing of a single group."""
     for by in TESTED:
-        yield from _difference(comparison, by)
-
-
-def _difference(comparison: Comparison, by: str) -> Iterator[str]:
-    """Shares of the groups of one kind, and whether they differ; nothing of a single group."""
-    known = [g for g in judged(comparison, by) if g.shorted.total]
-    if len(known) > 1:
-        chance = dependence(known)
-        parts = ", ".join(f"{_name(g)}: {g.shorted.count} of {g.shorted.total}" for g in known)
-        differ = "a significant difference" if chance < DIFFER else "no significant difference"
-        yield f"Low film resistance by {by}: {parts}; {differ} (p = {chance:.2g})."
+        known = [g for g in judged(comparison, by) if g.shorted.total]
+        if len(known) > 1:
+            chance = dependence(known)
+            counts = ", ".join(f"{_name(g)}: {g.shorted.count} of {g.shorted.total}" for g in known)
+            differ = "a significant difference" if chance < DIFFER else "no significant difference"
+            yield f"Low film resistance by {by}: {counts}; {differ} (p = {chance:.2g})."
 
 
 def _parted(comparison: Comparison) -> Iterator[str]:
@@ -182,6 +181,16 @@ def notes(comparison: Comparison) -> tuple[str, ...]:
         f"tested (Fisher; Freeman and Halton) and affirmed below p = {DIFFER:g}; every other comparison of groups is "
         "exploratory.",
     )
+
+
+def parts(comparison: Comparison, *, brief: bool) -> tuple[Part, ...]:
+    """Tables of verdicts, with notes unless they are to be brief; nothing without DC readings."""
+    if not comparison.direct:
+        return ()
+    tables = [table(comparison)] if len(comparison.last) > 1 else []
+    if directions := rows(comparison):
+        tables.append(Table.of("direction", "Electrode resistance by direction of the cogs", directions))
+    return (*tables, reasons(comparison), *(() if brief else notes(comparison)))
 
 
 def table(comparison: Comparison) -> Table:
@@ -325,12 +334,6 @@ def _predicted(of: Sequence[Compared]) -> float:
     """Of the networks that were measured, as films leak [ohm]."""
     values = [bounds.value for row in of if (bounds := row.expected_ohm)]
     return geometric_mean(values) if values else nan
-
-
-def direction_table(comparison: Comparison) -> Table | None:
-    """The rows as a table; None without any."""
-    tests = rows(comparison)
-    return Table.of("direction", "Electrode resistance by direction of the cogs", tests) if tests else None
 
 
 def direction_findings(comparison: Comparison) -> Iterator[str]:

@@ -5,15 +5,19 @@ optionally, the source to take: ``x60`` or ``x60@thesis-4.1``. Sources of the us
 files of packs too; a design that names none of them never sees them, so that its identity is the same for every reader.
 """
 
+import json
+import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from functools import cache, lru_cache
 from importlib import resources
 from math import exp, inf, isinf
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field, model_validator
 
+from sensorgen.core import files as store
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.records import Line, Strict, checked, stated
@@ -140,15 +144,15 @@ class Material(Strict):
             No source gives it, or only an implausible one that a design must name to get.
         """
         values = self.properties.get(quantity, []) + self.print.get(quantity, [])
-        own = [v for v in values if v.source == SET]
-        chosen = own or [v for v in values if v.source == source] or [v for v in values if v.default]
-        if not chosen:
+        rank = {source: 1, SET: 0}
+        usable = [v for v in values if v.source in rank or v.default]
+        if not usable:
             named = ", ".join(sorted(v.source for v in values))
             unnamed = ": no source gives it; set one with --set or material_values"
             raise MissingValue(
                 f"{self.name} has no default {quantity}" + (f"; name one of its sources: {named}" if named else unnamed)
             )
-        return chosen[0]
+        return min(usable, key=lambda v: rank.get(v.source, 2))
 
     def chosen(self, quantity: str, source: str = "") -> float | None:
         """Number of a quantity as :meth:`value` chooses it; None where it raises."""
@@ -281,13 +285,53 @@ def own_source(source: str, text: str | None = None, texts: Texts = NO_TEXTS) ->
 
 def _own(source: str, text: str | None) -> Own:
     """A source of the user's own, its values not checked yet."""
-    from sensorgen.design.materials import own
-
-    file = f"{source}.yaml" if text is not None else str(own.path(source))
+    file = f"{source}.yaml" if text is not None else str(source_path(source))
     try:
-        return checked(Own, yamlfile.parse(own.text(source) if text is None else text, file))
+        return checked(Own, yamlfile.parse(_source_text(source) if text is None else text, file))
     except BadInput as error:
         raise error.within(file) from None
+
+
+class SourceValue(NamedTuple):
+    """Value of a quantity with its interval, in the unit of the quantity's name."""
+
+    quantity: str
+    value: float
+    low: float
+    high: float
+    note: str = ""
+
+    def row(self) -> str:
+        """Line of a source's file."""
+        numbers = f"value: {self.value:.6g}, low: {self.low:.6g}, high: {self.high:.6g}"
+        return f"    {self.quantity}: {{{numbers}{f', note: {json.dumps(self.note)}' if self.note else ''}}}"
+
+
+def source_file(about: str, materials: Mapping[str, Iterable[SourceValue]], comments: Iterable[str] = ()) -> str:
+    """File of a source of the user's own: values of materials, and comments on what it has not."""
+    lines = [f"about: {json.dumps(about)}", "materials:"]
+    for material, values in materials.items():
+        rows = [value.row() for value in values]
+        lines += [f"  {material}:{'' if rows else ' {}'}", *rows]
+    return "\n".join((*lines, *(f"# {comment}" for comment in comments))) + "\n"
+
+
+def source_folder() -> Path:
+    """The folder of fits: what SENSORGEN_MATERIALS says, or the system's place for a user's data."""
+    return store.data(packs.SOURCES, "materials")
+
+
+def source_path(source: str) -> Path:
+    """The file of a source of the user's own: of the pack that has it, else where a fit is to write it."""
+    packed = (pack.path("sources", source) for pack in packs.own())
+    return next((file for file in packed if os.path.lexists(file)), source_folder() / f"{source}.yaml")
+
+
+def _source_text(source: str) -> str:
+    """Content of a source's file; raises BadInput where it cannot be read."""
+    file = source_path(source)
+    pack = next(pack for pack in packs.own() if pack.path("sources", source) == file)
+    return packs.File("sources", source, pack).text()
 
 
 def _check_values(name: str, values: Mapping[str, float], texts: Texts) -> None:
@@ -358,8 +402,11 @@ def fault(quantity: str, given: Value, *, advised: bool = False) -> str:
     low, high = _RANGES.get(quantity, (0.0, inf))
     if not low <= given.value <= high or (isinf(given.value) and given.default):
         return f"is {given.value:g}; expected {_said(low, high, 'a number from 0 on')}"
-    if wrong := disorder(given, advised=advised):
-        return wrong
+    return disorder(given, advised=advised) or _implausible(quantity, given)
+
+
+def _implausible(quantity: str, given: Value) -> str:
+    """Fault of a value, or an end of its range, that no solid or print has, unless its file says so; or ""."""
     low, high = _PLAUSIBLE.get(quantity, (-inf, inf))
     for number in (given.value, given.low, given.high):
         if number is not None and not low <= number <= high and not given.implausible:

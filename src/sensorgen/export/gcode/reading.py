@@ -342,8 +342,7 @@ class GcodeFile:
             named = command.has("XYZE")
             self._row(place, PLACE, [self._number(command, name, place) if named else 0.0 for name in "XYZE"])
         elif command.code == "G28":
-            homed = [name for name in "XYZ" if command.has(name)] or "XYZ"
-            self._row(place, PLACE, [0.0 if name in homed else np.nan for name in "XYZ"])
+            self._row(place, PLACE, _homed(command))
 
     def _fault(self, place: int, what: str, *, severe: bool = True) -> None:
         if len(self.faults) < MOST_FAULTS:
@@ -387,6 +386,12 @@ class GcodeFile:
                     self.relative.put(place, float(self._change.relative))
         self.tools.put(place, tool)
         self.changes.append((place, tool, macro))
+
+
+def _homed(command: Command) -> list[float]:
+    """Place of the axes that ``G28`` homes, all of them where it names none; nan of the others."""
+    homed = [name for name in "XYZ" if command.has(name)] or "XYZ"
+    return [0.0 if name in homed else np.nan for name in "XYZ"]
 
 
 def macro_name(command: Command) -> str:

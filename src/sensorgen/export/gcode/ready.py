@@ -14,13 +14,15 @@ comments, moves and everything else stay as they are. What changes is the printe
 - commands after the printer's last one are never reached and go.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import pairwise
-from math import isfinite
+from itertools import chain, pairwise
+from math import inf, isfinite
 from sys import maxsize
 
 import numpy as np
 
+from sensorgen.core.arrays import Mask
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import words
@@ -62,23 +64,15 @@ def ready(text: bytes, motion: Motion, machine: Printer) -> Iterator[bytes]:
     G10 P3 S0 R0
     """
     moved = motion.filament_mm != 0
-    absolute = np.flatnonzero(moved & (motion.absolute_e.column(len(motion.rows), 1.0) > 0))
-    if machine.control.relative_e and len(absolute):
-        raise BadInput(
-            f"line {motion.number[absolute[0]]} of the slicer's file moves filament with absolute E (M82); "
-            f"{machine.name} prints with relative E: let the slicer write that"
-        )
-    writer, moves = _Writer(machine), np.unique(motion.number)
+    _refuse_absolute(motion, moved, machine)
+    writer, moves = _Writer(machine), np.append(np.unique(motion.number), maxsize)
     starts = np.flatnonzero(np.frombuffer(b"\n" + text, np.uint8) == ord("\n")).tolist()  # of each line, and the end
     commands = {event.number for event in motion.events}
-    before = dict(_preheats(motion, machine))
-    for number, lines in _heights(text, motion, machine):
-        before[number] = [*before.get(number, ()), *lines]
+    before = _before(text, motion, machine)
     end = int(motion.number[moved].max(initial=0))  # the last to move filament
     done = 0  # lines
     for number in sorted({*commands, *before, end, len(starts)} - {0}):
-        place = int(np.searchsorted(moves, done, side="right"))
-        move = int(moves[place]) if place < len(moves) else maxsize
+        move = int(moves[np.searchsorted(moves, done, side="right")])
         if move <= number and (waiting := writer.take()):
             yield text[starts[done] : starts[move - 1]] + _coded(waiting)
             done = move - 1
@@ -93,8 +87,26 @@ def ready(text: bytes, motion: Motion, machine: Printer) -> Iterator[bytes]:
     yield from (text[starts[n] : starts[n + 1]] for n in range(done, len(starts) - 1) if n + 1 not in numbered)
 
 
+def _refuse_absolute(motion: Motion, moved: Mask, machine: Printer) -> None:
+    """Refuse filament that is moved with absolute E, where the printer's is relative."""
+    absolute = np.flatnonzero(moved & (motion.absolute_e.column(len(motion.rows), 1.0) > 0))
+    if machine.control.relative_e and len(absolute):
+        raise BadInput(
+            f"line {motion.number[absolute[0]]} of the slicer's file moves filament with absolute E (M82); "
+            f"{machine.name} prints with relative E: let the slicer write that"
+        )
+
+
 def _coded(lines: Iterable[str]) -> bytes:
     return "".join(lines).encode("utf-8", "surrogateescape")
+
+
+def _before(text: bytes, motion: Motion, machine: Printer) -> dict[int, list[str]]:
+    """Lines to write before lines of the file, by their numbers."""
+    before: dict[int, list[str]] = defaultdict(list)
+    for number, lines in chain(_preheats(motion, machine), _heights(text, motion, machine)):
+        before[number] += lines
+    return before
 
 
 def _preheats(motion: Motion, machine: Printer) -> Iterator[tuple[int, list[str]]]:
@@ -133,6 +145,15 @@ def _own(machine: Printer, index: float) -> int:
     return machine.tool_numbers[int(index)]
 
 
+def _with_remark(texts: Iterable[str], line: str) -> Iterator[str]:
+    """Lines in place of one, the first with its comment."""
+    code, semicolon, remark = line.rstrip("\r\n").partition(";")
+    behind = f"{code[len(code.rstrip()) :]};{remark}" if semicolon else ""
+    for text in texts:
+        yield f"{text}{behind}\n"
+        behind = ""
+
+
 class _Writer:
     """Writer that knows of its lines what later ones depend on."""
 
@@ -142,7 +163,8 @@ class _Writer:
         self.waiting: list[str] = []  # taking the first tool, until the axes are homed
         self.homed = machine.tool_at_start() is not None  # such a printer may take tools at any time
         self.ended = False
-        self.hot: list[int] = []
+        self.standby_c = inf if self.control.standby_c is None else self.control.standby_c
+        self.hot: dict[int, None] = {}  # tools in the order in which they were heated
         self.offset_mm = None if self.control.tool_offsets_mm else 0.0  # an earlier print may have left another
 
     def line(self, line: str) -> Iterator[str]:
@@ -152,15 +174,9 @@ class _Writer:
         if all(new is None for new in changed):
             yield line
         else:
-            code, semicolon, remark = line.rstrip("\r\n").partition(";")
-            gap = code[len(code.rstrip()) :]
-            texts = (
-                text
-                for c, new in zip(parsed.commands, changed, strict=True)
-                for text in ([str(c)] if new is None else new)
-            )
-            for place, text in enumerate(texts):
-                yield f"{text}{gap}{semicolon}{remark}\n" if place == 0 and semicolon else f"{text}\n"
+            pairs = zip(parsed.commands, changed, strict=True)
+            texts = chain.from_iterable([str(c)] if new is None else new for c, new in pairs)
+            yield from _with_remark(texts, line)
         for command in parsed.commands:
             self.homed |= command.code in self.control.homes
             self.ended |= command.code in self.control.ends
@@ -174,7 +190,7 @@ class _Writer:
         """Switch the tools off that the file has heated."""
         if self.control.names_tools:
             yield from (f"G10 P{tool} S0 R0\n" for tool in self.hot)
-        self.hot = []
+        self.hot = {}
 
     def _command(self, command: Command) -> Sequence[str] | None:
         """Other words for a command; None where it stays."""
@@ -185,13 +201,16 @@ class _Writer:
             return self._temperature(command)
         if code in ("G10", "M568"):
             return self._tool_settings(command)
-        if code == "M106" and fan is not None and not command.has("P"):
-            return [str(Command("M106", (("P", str(fan)), *command.words)))]
-        if code == "M107" and fan is not None:
-            return [f"M106 P{fan} S0"]
+        if code in ("M106", "M107") and fan is not None:
+            return self._fan(command, fan)
         if code == "M82" and self.control.relative_e:
             return []
         return self._of_tool(command) if code == "M116" else None
+
+    def _fan(self, command: Command, fan: int) -> Sequence[str] | None:
+        if command.code == "M107":
+            return [f"M106 P{fan} S0"]
+        return None if command.has("P") else [str(Command("M106", (("P", str(fan)), *command.words)))]
 
     def _change(self, command: Command) -> Sequence[str]:
         self.tool = _own(self.machine, float(command.code[1:]))
@@ -209,27 +228,26 @@ class _Writer:
 
     def _tool_settings(self, command: Command) -> Sequence[str] | None:
         """``G10`` and ``M568`` with temperatures; the state that the latter may also set, by itself."""
-        if not command.has("SR") or not self.control.names_tools:
-            # G10 without them is retraction by the firmware, or offsets of a place of work
-            return self._of_tool(command) if command.code == "M568" or command.has("SR") else None
-        index = command.number("P")
-        tool = self.tool if index is None else _own(self.machine, index)
+        if command.code == "G10" and not command.has("SR"):
+            return None  # retraction by the firmware, or offsets of a place of work
+        if not (command.has("SR") and self.control.names_tools):
+            return self._of_tool(command)
+        tool = self._named(command, "P")
         if tool is None:
-            return None if command.code == "G10" else self._of_tool(command)
-        settings = [self._settings(tool, command.number("S"), command.number("R"))]
-        if command.code == "M568" and command.has("A"):
-            state = Command("M568", tuple(word for word in command.words if word[0] not in "SR"))
-            settings += self._of_tool(state) or [str(state)]
-        return settings
+            return None
+        settings = self._settings(tool, command.number("S"), command.number("R"))
+        if command.code == "G10" or not command.has("A"):
+            return [settings]
+        state = command.without("SR")
+        return [settings, *(self._of_tool(state) or [str(state)])]
 
     def _temperature(self, command: Command) -> Sequence[str] | None:
         active = command.number("S")
         if not self.control.names_tools or active is None:
             return self._of_tool(command, "T")
-        index = command.number("T")
-        if index is None and active <= 0:
+        if command.number("T") is None and active <= 0:
             return [text.strip() for text in self.cold()]
-        tool = self.tool if index is None else _own(self.machine, index)
+        tool = self._named(command, "T")
         if tool is None:
             raise BadInput(f"{command.code} of the slicer's file names no tool, and none is taken yet")
         waits = [f"M116 P{tool}"] if command.code == "M109" else []
@@ -237,15 +255,20 @@ class _Writer:
 
     def _settings(self, tool: int, active: float | None, standby: float | None) -> str:
         if active is not None and standby is None:
-            standby = active if self.control.standby_c is None else min(active, self.control.standby_c)
-        if active and tool not in self.hot:
-            self.hot.append(tool)
-        elif active == 0 and tool in self.hot:
-            self.hot.remove(tool)
-        given = [("S", active), ("R", standby)]
-        if any(value is not None and not isfinite(value) for _, value in given):
+            standby = min(active, self.standby_c)
+        if active:
+            self.hot[tool] = None
+        elif active == 0:
+            self.hot.pop(tool, None)
+        given = [(letter, value) for letter, value in (("S", active), ("R", standby)) if value is not None]
+        if not all(isfinite(value) for _, value in given):
             raise BadInput(f"the slicer's file sets tool {tool} to a temperature that is no number")
-        return " ".join([f"G10 P{tool}", *(f"{letter}{value:g}" for letter, value in given if value is not None)])
+        return " ".join([f"G10 P{tool}", *(f"{letter}{value:g}" for letter, value in given)])
+
+    def _named(self, command: Command, letter: str) -> int | None:
+        """The printer's number of the tool that a command names, else of the one in hand."""
+        index = command.number(letter)
+        return self.tool if index is None else _own(self.machine, index)
 
     def _of_tool(self, command: Command, letter: str = "P") -> Sequence[str] | None:
         """A command that names a tool, with the printer's number of it."""

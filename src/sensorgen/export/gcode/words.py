@@ -67,6 +67,10 @@ class Command:
         """Test whether it has a word with any of these letters."""
         return any(name in letters for name, _ in self.words)
 
+    def without(self, letters: str) -> "Command":
+        """The command without the words with these letters."""
+        return Command(self.code, tuple(word for word in self.words if word[0] not in letters))
+
 
 @dataclass(frozen=True, slots=True)
 class GcodeLine:

@@ -32,7 +32,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from sensorgen.core.errors import SlicerFailed
-from sensorgen.export.slicers import PROGRAMS
+from sensorgen.design.walls import PROGRAMS
 
 FLAVOURS = {"reprapfirmware": "RepRap (RepRap)", "marlin": "RepRap (Marlin/Sprinter)"}
 PATTERNS = {

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design.printer import PRIME_MM3, Printer, Quality, tower
-from sensorgen.export.slicers import PROGRAMS
+from sensorgen.design.walls import PROGRAMS
 from sensorgen.export.slicers.loads import (
     Recipe,
     ToolLoad,

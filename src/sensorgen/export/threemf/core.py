@@ -101,7 +101,7 @@ def check(title: str, parts: Sequence[Part], centre_mm: tuple[float, float]) -> 
     """
     if not parts:
         raise BadInput("no bodies to write: a 3MF needs at least one")
-    if not all(math.isfinite(c) for c in centre_mm):
+    if not all(map(math.isfinite, centre_mm)):
         raise OutOfRange(f"centre {centre_mm} mm on the bed is not finite")
     names = [part.name for part in parts]
     twice = sorted({name for name in names if names.count(name) > 1})

@@ -14,8 +14,7 @@ from sensorgen.core import yamlfile
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange, within
 from sensorgen.core.records import Line, Strict, checked, problem
-from sensorgen.measure.signal.presses import GUARD_S, WINDOW_S
-from sensorgen.measure.signal.schedule import RunPlan
+from sensorgen.measure.signal.presses import GUARD_S, WINDOW_S, RunPlan
 from sensorgen.measure.virtual.mechanics import VirtualSpecimen
 from sensorgen.prediction.query import TONES_HZ
 

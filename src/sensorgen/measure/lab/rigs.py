@@ -12,7 +12,7 @@ from sensorgen.measure.lab.experiment import Device, Devices, Experiment
 from sensorgen.measure.lab.meters import Multimeter
 from sensorgen.measure.lab.port import VisaPort
 from sensorgen.measure.lab.safety import RunDevices
-from sensorgen.measure.virtual import faults, mechanics
+from sensorgen.measure.virtual import mechanics
 
 _HEARD = 1000  # messages that a simulator remembers
 ROLES = ("actuator", "stage", "impedance")
@@ -20,7 +20,7 @@ SIMULATED = Devices(
     actuator=Device(kind="smac-lcc10"), stage=Device(kind="reprapfirmware"), impedance=Device(kind="handyscope-hs5")
 )
 """The thesis's rig, where an experiment names no devices."""
-_STRIKES: Mapping[str, faults.Strikes] = {
+_STRIKES: Mapping[str, mechanics.Strikes] = {
     "smac-lcc10": "actuator", "reprapfirmware": "stage", "handyscope-hs5": "analyser", "hp-4284a": "lcr-meter",
     "keysight-e4980a": "lcr-meter",
 }  # fmt: skip
@@ -88,8 +88,8 @@ def _strike(virtual: mechanics.VirtualSpecimen, devices: Devices) -> None:
     """Refuse planted faults of devices that are not in use."""
     struck = {"rig", *(_STRIKES.get(getattr(devices, role).kind, "") for role in ROLES)}
     for one in virtual.faults:
-        if faults.FAULTS[one.what].strikes not in struck:
-            known = ", ".join(name for name, fault in faults.FAULTS.items() if fault.strikes in struck)
+        if mechanics.FAULTS[one.what].strikes not in struck:
+            known = ", ".join(name for name, fault in mechanics.FAULTS.items() if fault.strikes in struck)
             raise BadInput(f"faults: {one.what!r} strikes a device that is not in use; expected one of {known}")
 
 

@@ -20,10 +20,9 @@ from sensorgen.measure.lab import press, recorder, safety
 from sensorgen.measure.lab.devices import Clock, Identity, SelfLifting, SimulatedClock
 from sensorgen.measure.lab.experiment import Choice, DonePress, Experiment, Next, NextPress, PlannedPress
 from sensorgen.measure.lab.live import Controls
-from sensorgen.measure.lab.loop import Alive, Loop, Paused, Predicted, RunView
+from sensorgen.measure.lab.press import Alive, Loop, Paused, Predicted, RunView
 from sensorgen.measure.lab.recorder import Recorder, RunFolder
-from sensorgen.measure.lab.safety import Ended, RunDevices
-from sensorgen.measure.lab.watch import Watch
+from sensorgen.measure.lab.safety import Ended, RunDevices, Watch
 from sensorgen.measure.log import BenchRun, Log, notes
 
 Confirm = Callable[["PlannedRun", dict[str, Identity]], bool]
@@ -181,7 +180,7 @@ def run(
     simulated : bool
         Whether the devices are; the log says so.
     view, controls, guardian, predicted
-        As of :class:`sensorgen.measure.lab.loop.Loop`.
+        As of :class:`sensorgen.measure.lab.press.Loop`.
     next_press : callable, optional
         Chooses the presses of ``next`` parts.
     resume : Path, optional

@@ -12,7 +12,7 @@ all records that its chain of parents leads to, whatever any clock says.
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import sha256
 
 _WORD = re.compile(r"[^\s]+")
@@ -73,6 +73,24 @@ def sound(record: Record) -> bool:
     )
 
 
+@dataclass
+class _Line:
+    """Records that follow each other, and how far it knows other lines to have come, by their number."""
+
+    last: int = -1
+    known: list[tuple[int, dict[int, int]]] = field(default_factory=list)  # from this record on
+
+    def seen(self, number: int) -> dict[int, int]:
+        """Last record of each other line before a record of this one."""
+        return next((seen for start, seen in reversed(self.known) if start <= number), {})
+
+    def append(self, seen: dict[int, int]) -> None:
+        """Add a record that comes after these of other lines."""
+        self.last += 1
+        if not self.known or seen != self.known[-1][1]:
+            self.known.append((self.last, seen))
+
+
 class Ancestry:
     """Order of the records of a log in which several machines wrote.
 
@@ -87,31 +105,25 @@ class Ancestry:
 
     def __init__(self, records: Iterable[tuple[str, tuple[str, ...]]]) -> None:
         self._place: dict[str, tuple[int, int]] = {}  # line, and number on it
-        self._ends: list[int] = []  # last number on each line
-        self._known: list[list[tuple[int, dict[int, int]]]] = []  # of a line: from this number on, so far on the others
+        self._lines: list[_Line] = []
         for key, parents in records:
             self._append(key, parents)
 
     def _append(self, key: str, parents: tuple[str, ...]) -> None:
         places = [self._place[parent] for parent in parents]
-        line, number = next((place for place in places if self._ends[place[0]] == place[1]), (len(self._ends), -1))
-        if line == len(self._ends):
-            self._ends.append(-1)
-            self._known.append([])
-        seen: dict[int, int] = dict(self._known[line][-1][1]) if self._known[line] else {}
-        for other, at in places:
-            for each, reached in ((other, at), *self._seen(other, at).items()):
+        line = next((line for line, number in places if self._lines[line].last == number), len(self._lines))
+        if line == len(self._lines):
+            self._lines.append(_Line())
+        own = self._lines[line]
+        seen = dict(own.seen(own.last))
+        for other, number in places:
+            for each, reached in ((other, number), *self._lines[other].seen(number).items()):
                 if each != line:
                     seen[each] = max(reached, seen.get(each, -1))
-        if not self._known[line] or seen != self._known[line][-1][1]:
-            self._known[line].append((number + 1, seen))
-        self._place[key] = line, number + 1
-        self._ends[line] = number + 1
-
-    def _seen(self, line: int, number: int) -> dict[int, int]:
-        return next(known for start, known in reversed(self._known[line]) if start <= number)
+        own.append(seen)
+        self._place[key] = line, own.last
 
     def before(self, first: str, second: str) -> bool:
         """Test whether the chain of the second record leads to the first."""
         (line, number), (other, at) = self._place[first], self._place[second]
-        return number < at if line == other else self._seen(other, at).get(line, -1) >= number
+        return number < at if line == other else self._lines[other].seen(at).get(line, -1) >= number

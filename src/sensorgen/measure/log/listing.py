@@ -84,19 +84,24 @@ class Detail:
 
     def document(self) -> Iterator[Part]:
         """Everything about it."""
-        row = self.entry
-        kind = {Reading: "reading", BenchRun: "recording"}.get(type(row), type(row).__name__.lower())
-        name = f"{kind} {row.number}: {getattr(row, 'specimen', '')}".rstrip()
-        yield f"{name}, written {row.written!r}" if isinstance(row, Reading) and row.written != row.specimen else name
-        known = (
-            *(_of_reading(row) if isinstance(row, Reading) else ((name, getattr(row, name, "")) for name in _OTHER)),
-            ("logged", row.logged_at),
-            ("claimed", row.claimed_at),
-        )
-        doubts = (("doubtful", doubt) for doubt in getattr(row, "doubts", ()))
-        summary = bench.from_json(row.facts).words() if isinstance(row, BenchRun) else ()
-        rows = ((name, fact) for name, fact in (*known, *doubts, *summary, *self.remarks) if fact)
-        yield Facts(tuple((f"  {name}", fact) for name, fact in rows))
+        yield _title(self.entry)
+        yield Facts(tuple((f"  {name}", fact) for name, fact in (*_facts(self.entry), *self.remarks) if fact))
+
+
+def _title(row: Entry) -> str:
+    kind = {Reading: "reading", BenchRun: "recording"}.get(type(row), type(row).__name__.lower())
+    name = f"{kind} {row.number}: {getattr(row, 'specimen', '')}".rstrip()
+    return f"{name}, written {row.written!r}" if isinstance(row, Reading) and row.written != row.specimen else name
+
+
+def _facts(row: Entry) -> Iterator[tuple[str, str]]:
+    """Names and values of all that a row has, "" where it lacks one."""
+    yield from _of_reading(row) if isinstance(row, Reading) else ((name, getattr(row, name, "")) for name in _OTHER)
+    yield "logged", row.logged_at
+    yield "claimed", row.claimed_at
+    yield from (("doubtful", doubt) for doubt in getattr(row, "doubts", ()))
+    if isinstance(row, BenchRun):
+        yield from bench.from_json(row.facts).words()
 
 
 def _of_reading(r: Reading) -> tuple[tuple[str, str], ...]:

@@ -1,4 +1,4 @@
-"""Bind specimens to the design that they were printed of: one by one, or by the record of a print bed."""
+"""Bind specimens to the design that they were printed of, one by one or by a print bed's record; log its prediction."""
 
 import hashlib
 import json
@@ -13,11 +13,10 @@ from typing import Any
 
 from pydantic import Field
 
-from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, within
+from sensorgen.core.errors import BadInput, MissingValue, NotTrusted, SensorgenError, within
 from sensorgen.core.records import Strict, checked, shown
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design, load, of_resolved
-from sensorgen.design.shape_files import NotTrusted
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import notes
 from sensorgen.measure.log.entries import Batch, BenchRun, DesignRow, Entry, Prediction, Print, RawFile, Reading
@@ -252,3 +251,48 @@ def _check_measured(log: Log, name: str, design_id: str, design: str) -> None:
             f"{shown(name)} was measured as {other.design} ({other.design_id}) and cannot become {design} "
             f"({design_id}): take another name, as '{name} own'"
         )
+
+
+def predict(log: Log, specimen: str) -> list[Entry]:
+    """Log a prediction of a specimen's design, unless the log has one.
+
+    Parameters
+    ----------
+    log : Log
+        An open log.
+    specimen : str
+        Name of the specimen.
+
+    Returns
+    -------
+    list of Entry
+        The new prediction, if there is one.
+
+    Raises
+    ------
+    BadInput
+        A name that cannot be parsed.
+    MissingValue
+        The name stands for no design, or the log lacks the design that it is bound to.
+    """
+    bound = log.bound(notes.specimen(specimen, log).specimen)
+    design = designs(log).get(bound.design_id) if bound else notes.design_of(specimen)
+    design_id = bound.design_id if bound else design.id() if design else ""
+    if design_id and log.predictions(design_id=design_id):
+        return []
+    if design is None:
+        raise MissingValue(f"{specimen!r} names no design; log a prediction of its file: sensorgen log predict FILE")
+    return [row for row in log.add(predicted_rows(design)) if isinstance(row, Prediction)]
+
+
+def predicted_rows(design: Design) -> list[Entry]:
+    """A design and the prediction of its print, as rows of the log."""
+    from sensorgen.prediction import bodies
+    from sensorgen.prediction.evaluate import evaluate
+    from sensorgen.prediction.results import to_json
+
+    predicted = evaluate(bodies.default_body(design))
+    return [
+        design_row(design.id(), design.name, design.resolved()),
+        prediction(design.id(), design.name, json.loads(to_json(predicted))),
+    ]

@@ -443,18 +443,25 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
         Too few samples or rows; no response to the force, and no common clock to assume instead.
     """
     common_clock = all(np.isfinite(one.epoch_s) for one in recordings)
-    stamped = common_clock and rig.stamped
-    within_s = min(within_s, _STAMPED_S) if stamped else within_s
     times = [one.real_s() if common_clock else one.time_s for one in recordings]
-    best = _best(recordings, times, rig, within_s)
-    if best.by_chance or (stamped and abs(best.offset_s) > within_s):  # its refinement looks beyond
-        if not common_clock and not _overlap(times[0], rig):
-            raise BadInput(
-                f"the force explains {best.explained:.1%} of the readings: too little to find the offset of the "
-                "clocks; expected time stamps, or times of both files that count from the same moment"
-            )
-        best = replace(best, offset_s=0.0, offset_error_s=np.nan, skew=0.0, skew_error=np.nan)
-    return tuple(_joined(one, rig, time, best) for one, time in zip(recordings, times, strict=True))
+    limit_s = min(within_s, _STAMPED_S) if common_clock and rig.stamped else np.inf
+    offset = _best(recordings, times, rig, min(within_s, limit_s))
+    if offset.by_chance or abs(offset.offset_s) > limit_s:  # its refinement looks beyond
+        if not common_clock:
+            _refuse_apart(times[0], rig, offset)
+        offset = replace(offset, offset_s=0.0, offset_error_s=np.nan, skew=0.0, skew_error=np.nan)
+    return tuple(_joined(one, rig, time, offset) for one, time in zip(recordings, times, strict=True))
+
+
+def _refuse_apart(time: Real, rig: RigLog, offset: Offset) -> None:
+    """Refuse clocks whose offset is unknown, unless half of the shorter record lies in the other, as if they agreed."""
+    rows = rig.sound()[0]
+    common = min(time[-1], rows[-1]) - max(time[0], rows[0])
+    if not common >= 0.5 * min(np.ptp(time), np.ptp(rows)):
+        raise BadInput(
+            f"the force explains {offset.explained:.1%} of the readings: too little to find the offset of the "
+            "clocks; expected time stamps, or times of both files that count from the same moment"
+        )
 
 
 def _best(recordings: Sequence[Recording], times: Sequence[Real], rig: RigLog, within_s: float) -> Offset:
@@ -469,13 +476,6 @@ def _best(recordings: Sequence[Recording], times: Sequence[Real], rig: RigLog, w
     if not offsets:
         raise faults[0]
     return min(offsets, key=lambda offset: (offset.by_chance, offset.offset_error_s))
-
-
-def _overlap(time: Real, rig: RigLog) -> bool:
-    """True if half of the shorter record lies in the other, as with clocks that agree."""
-    rows = rig.sound()[0]
-    common = min(time[-1], rows[-1]) - max(time[0], rows[0])
-    return bool(common >= 0.5 * min(np.ptp(time), np.ptp(rows)))
 
 
 def _joined(recording: Recording, rig: RigLog, time: Real, offset: Offset) -> Joined:

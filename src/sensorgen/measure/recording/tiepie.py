@@ -206,16 +206,12 @@ class _LockIn:
 
 
 def _matrix(raw: Any, name: str, tones: int) -> tuple[Vector, ...]:
-    """Parts of the impedance with a row per sample and a column per frequency; one frequency may be a row."""
+    """Parts of the impedance, a row per sample and a column per frequency; one frequency or sample may be a vector."""
     wrong = BadInput(f"impedance_data.{name} is {_described(raw)}; expected a column for each of its {tones} tones")
     if not isinstance(raw, np.ndarray | Split) or raw.dtype.kind not in "iufcb" or raw.ndim > 2:
         raise wrong
-    shape = raw.shape
-    if tones == 1 and raw.size == max(shape, default=1):
-        shape = (raw.size, 1)
-    elif raw.ndim == 1 and raw.size == tones:
-        shape = (1, raw.size)
-    if len(shape) != 2 or shape[1] != tones:
+    shape, is_vector = (raw.size // tones, tones), raw.size == max(raw.shape, default=1)
+    if raw.shape not in (shape, (tones,)) and not (is_vector and tones == 1):
         raise wrong
     return tuple(part.reshape(shape) for part in ((raw.real, raw.imag) if raw.dtype.kind == "c" else (raw.real,)))
 

@@ -317,17 +317,11 @@ def fitted(
     UnknownName
         No such law.
     """
-    if not among:
-        raise BadInput(f"no law of drift to choose from; expected some of {', '.join(LAWS)}")
-    for name in among:
-        check(name)
+    check(*among)
     rest = valid & ~_disturbed(time_s, force_n, settle_s)
     if np.count_nonzero(rest) < _LEAST:
         raise BadInput(f"{np.count_nonzero(rest)} readings at rest; expected {_LEAST} or more to fit a drift to")
-    start = float(time_s[0])
-    columns = (column[rest] for column in impedance_ohm.T)  # one by one, to save memory
-    each = [binned(time_s[rest], (np.log(np.abs(z)) + 1j * np.unwrap(np.angle(z)))[:, None]) for z in columns]
-    bins = replace(each[0], values=np.hstack([of.values for of in each]))
+    bins, start = _bins(time_s, impedance_ohm, rest), float(time_s[0])
     seconds = max(float(time_s[-1]) - start, 1e-9)
     by_time = explained(bins, (smooth(start, seconds),))
     fits = {"line": explained(bins, (linear(start, seconds),)), "smooth": by_time}
@@ -339,16 +333,26 @@ def fitted(
     return Drift(best, f"{LAWS[best]} ({_reason(scores, best)})", start, fits[best])
 
 
+def _bins(time_s: Real, impedance_ohm: Complex, rest: Mask) -> Bins:
+    """Bins of ln Z at rest, frequency by frequency, to save memory."""
+    columns = (column[rest] for column in impedance_ohm.T)
+    each = [binned(time_s[rest], (np.log(np.abs(z)) + 1j * np.unwrap(np.angle(z)))[:, None]) for z in columns]
+    return replace(each[0], values=np.hstack([of.values for of in each]))
+
+
 def _reason(scores: Mapping[str, float], best: str) -> str:
     """Criteria of the other laws, above that of the best."""
     others = [f"{other} {scores[other] - scores[best]:.0f}" for other in scores if scores[other] > scores[best]]
     return f"BIC higher of {', '.join(others)}" if others else "the only law"
 
 
-def check(law: str) -> None:
-    """Refuse an unknown law."""
-    if law not in LAWS:
-        raise UnknownName("law of drift", law, LAWS)
+def check(*laws: str) -> None:
+    """Refuse an unknown law, and none at all."""
+    if not laws:
+        raise BadInput(f"no law of drift to choose from; expected some of {', '.join(LAWS)}")
+    for law in laws:
+        if law not in LAWS:
+            raise UnknownName("law of drift", law, LAWS)
 
 
 def _disturbed(time_s: Real, force_n: Real, settle_s: float) -> Mask:

@@ -15,10 +15,10 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
 from sensorgen.prediction.array.elements import Past, doubtful_time
 from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
-from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, own_slopes
+from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, broken_where_dead, own_slopes
 from sensorgen.prediction.array.sessions import ArrayCalibration
 from sensorgen.prediction.array.study import DETECTED, DETERMINED
-from sensorgen.prediction.inverse.verdict import NORMAL_90
+from sensorgen.prediction.inference import NORMAL_90
 from sensorgen.solvers.tracks import CrossingReadings, Tracks, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
@@ -28,6 +28,7 @@ _HEAVIER = 1.1  # times the heaviest frame so far: a later one is compared with 
 _SUFFICES = 0.5  # standard error by which C/C0 may differ from the network
 _ALIVE = 3.0  # factor of a reading at rest to the predicted one; prints differ by less
 _LEAST_PHASE = 50.0  # degrees that capacitances alone need
+_MIXED = 10.0  # error with all others open over that of a crossing alone; 55 to 183 were seen, else 1.0 to 1.3
 _SHORTED = 10.0  # real part at rest over the predicted magnitude
 _LEAKS = 6  # steps to the conductance of shorts
 _SHOWN = 6  # crossings that are named
@@ -60,6 +61,8 @@ class PressureMaps:
         not determined [kPa].
     calibration : ArrayCalibration or None
         That gave the pressures; its errors are in the standard errors.
+    faults : tuple of str
+        Breaks and shorts that the readings at rest show, as in :func:`faulty`.
     """
 
     model: ArrayModel
@@ -68,6 +71,7 @@ class PressureMaps:
     pressure_kpa: Real
     sigma_kpa: Real
     calibration: "ArrayCalibration | None" = None
+    faults: tuple[str, ...] = ()
 
     def on_surface(self) -> "PressureMaps":
         """Maps of the pressure on the cover, its spread undone; what is not determined is as what lies around it.
@@ -214,6 +218,8 @@ class PressureMaps:
             ("frames", f"{len(self.time_s)}, inverted by {self.by}"),
             ("pressures", errors),
             *((("not determined", f"{dark} of {count} crossings: {self._names(k)}"),) if dark else ()),
+            *((("faults at rest", f"{', '.join(self.faults)} (r3:5: row 3 broken behind column 5; r2c4: a short)"),)
+              if self.faults else ()),
         ))  # fmt: skip
         yield ""
         shown = tuple(float(f"{v:.4g}") if isinstance(v, float) else v for v in table.cells[k])
@@ -319,18 +325,26 @@ class MapInverter:
             )
 
     def read(self, capacitance_f: Real) -> CrossingReadings:
-        """Readings of the network, with the shorts that the readings at rest show."""
-        return self._network(capacitance_f, self.leaks_s)
+        """Readings of the network, with the breaks and shorts that the readings at rest show."""
+        return self._network(self._tracks, capacitance_f, self.leaks_s)
 
-    def _network(self, capacitance_f: Real, leaks_s: Real) -> CrossingReadings:
+    def _network(self, tracks: Tracks, capacitance_f: Real, leaks_s: Real) -> CrossingReadings:
         return readings(
-            replace(self._tracks, capacitance_f=capacitance_f, leak_s=leaks_s), self.readout.frequency_hz[0],
+            replace(tracks, capacitance_f=capacitance_f, leak_s=leaks_s), self.readout.frequency_hz[0],
             readout=self.readout.kind, input_ohm=self.readout.input_ohm,
         )  # fmt: skip
 
     @cached_property
     def _tracks(self) -> Tracks:
-        return self.model.tracks()
+        return broken_where_dead(self.model.tracks(), self.model.here, self._over_nominal < 1 / _ALIVE)
+
+    @cached_property
+    def _over_nominal(self) -> Real:
+        """Size of the readings at rest over the predicted one, (m, n); nan where there is none [-]."""
+        real, nominal = np.isfinite(self.rest_s.real), self.nominal.siemens
+        with np.errstate(invalid="ignore", divide="ignore"):
+            size = np.where(real, np.abs(self.rest_s), np.abs(self.rest_s.imag))
+            return np.asarray(size / np.where(real, np.abs(nominal), np.abs(nominal.imag)))
 
     @cached_property
     def leaks_s(self) -> Real:
@@ -340,10 +354,25 @@ class MapInverter:
             shorted = self.model.here & (self.rest_s.real > _SHORTED * np.abs(self.nominal.siemens))
         leaks[shorted] = self.rest_s.real[shorted]
         for _ in range(_LEAKS if shorted.any() else 0):
-            read = self._network(self.model.capacitances(), leaks).siemens.real[shorted]
+            read = self._network(self._tracks, self.model.capacitances(), leaks).siemens.real[shorted]
             ohm = 1 / leaks[shorted] + 1 / self.rest_s.real[shorted] - 1 / read
             leaks[shorted] = 1 / np.maximum(ohm, 1e-3 / leaks[shorted])
         return leaks
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Breaks and shorts that the readings at rest show, as in :func:`faulty`."""
+        whole, read = self.model.tracks(), self._tracks
+        words = [f"r{i + 1}c{j + 1}" for i, j in np.argwhere(self.leaks_s > 0).tolist()]
+        for letter, side in (("r", "row"), ("c", "column")):
+            stretches, leads = (
+                np.isinf(getattr(read, f"{side}_{part}")) & np.isfinite(getattr(whole, f"{side}_{part}"))
+                for part in ("ohm", "lead_ohm")
+            )
+            stretches = stretches if side == "row" else stretches.T
+            words += [f"{letter}{track + 1}:{after + 1}" for track, after in np.argwhere(stretches).tolist()]
+            words += [f"{letter}{track + 1}:0" for track in np.flatnonzero(leads).tolist()]
+        return tuple(words)
 
     @cached_property
     def parts(self) -> tuple[Mask, Mask]:
@@ -353,17 +382,15 @@ class MapInverter:
     @cached_property
     def nominal(self) -> CrossingReadings:
         """Readings of the array as predicted, at rest."""
-        return self._network(self.model.capacitances(), np.zeros(self.model.here.shape))
+        return self._network(self.model.tracks(), self.model.capacitances(), np.zeros(self.model.here.shape))
 
     @cached_property
     def alive(self) -> Mask:
         """Crossings that read at rest within a factor of what is predicted, and of its sign, (m, n): no others."""
-        real, imaginary = np.isfinite(self.rest_s.real), np.isfinite(self.rest_s.imag) & self.model.here
-        nominal = self.nominal.siemens
-        with np.errstate(invalid="ignore", divide="ignore"):
-            size = np.where(real, np.abs(self.rest_s), np.abs(self.rest_s.imag))
-            ratio = size / np.where(real, np.abs(nominal), np.abs(nominal.imag))
-            return np.asarray(imaginary & (ratio > 1 / _ALIVE) & (ratio < _ALIVE) & self._same_sign(self.rest_s))
+        ratio = self._over_nominal
+        with np.errstate(invalid="ignore"):
+            near = (ratio > 1 / _ALIVE) & (ratio < _ALIVE) & self._same_sign(self.rest_s)
+        return np.asarray(np.isfinite(self.rest_s.imag) & self.model.here & near)
 
     def _same_sign(self, siemens: Complex) -> Mask:
         """Readings with an imaginary part of the predicted one's sign: others are of no capacitance."""
@@ -457,10 +484,22 @@ class MapInverter:
         """Capacitances at rest of this print, with the network, (m, n) [F]."""
         return self._rest[0]
 
+    @cached_property
+    def own(self) -> Mask:
+        """Crossings that are alive, and whose readings are not those of others that nothing else tells, (m, n).
+
+        Beside a short, the loose part of a broken track mixes what crosses it.
+        """
+        if self.model.here.size > MOST_DENSE:
+            return self.alive
+        slopes = own_slopes(self.read(self.model.capacitances()))
+        alone = self.readout.sigma_s(self.nominal.siemens) / np.maximum(np.abs(slopes), 1e-30)
+        return self.alive & (self.gain[1].reshape(alone.shape) < (_MIXED * alone) ** 2)
+
     def by_ratio(self, siemens: Complex) -> Real:
         """Capacitance over that at rest, of each crossing by its own reading alone [-]."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(self.alive, siemens.imag / self.rest_s.imag, np.nan)
+            return np.where(self.own, siemens.imag / self.rest_s.imag, np.nan)
 
     def by_network(self, siemens: Complex) -> Real:
         """Capacitance over that at rest with the network, frame by frame; nan where Gauss-Newton did not settle [-]."""
@@ -479,7 +518,7 @@ class MapInverter:
     def _compared(self, siemens: Complex, ratio: Real) -> float:
         """Largest difference of C/C0 from the network in a frame, in standard errors."""
         network = self.by_network(siemens[None])[0]
-        counted = _known(self.error * self.model.pressures(np.ones(1))[1]) & self.alive & np.isfinite(ratio)
+        counted = _known(self.error * self.model.pressures(np.ones(1))[1]) & self.own & np.isfinite(ratio)
         off = (np.abs(network - ratio) / self.error)[counted]
         return float(np.where(np.isnan(off), np.inf, off).max(initial=0.0))
 
@@ -490,7 +529,7 @@ class MapInverter:
         that are heavier by a tenth than all before, so that a frame has one answer, alone, in a lot or in a recording.
         """
         ratio, error, plan = self.by_ratio(siemens), self.error, plan or MapPlan()
-        loads, light = np.nansum(np.where(self.alive, ratio - 1, 0), (1, 2)), 0
+        loads, light = np.nansum(np.where(self.own, ratio - 1, 0), (1, 2)), 0
         while light < len(loads) and not plan.network:
             if loads[light] > _HEAVIER * plan.load:
                 plan.worst = max(plan.worst, self._compared(siemens[light], ratio[light]))
@@ -499,8 +538,8 @@ class MapInverter:
         by, solved = plan.words(), siemens[light:]
         if not len(solved):
             return ratio, error, by
-        ratio[light:] = np.where(np.isfinite(solved.imag) & self.alive, self.by_network(solved), np.nan)
-        if lost := int((np.isnan(ratio) & np.isfinite(siemens.imag) & self.alive).sum()):
+        ratio[light:] = np.where(np.isfinite(solved.imag) & self.own, self.by_network(solved), np.nan)
+        if lost := int((np.isnan(ratio) & np.isfinite(siemens.imag) & self.own).sum()):
             by += f"; {lost} values left out that {_STEPS} steps of Gauss-Newton did not settle"
         return ratio, error, by
 
@@ -513,13 +552,13 @@ class MapInverter:
         pressure, per = self.model.pressures(np.nan_to_num(ratio, nan=1.0, posinf=1.0, neginf=1.0))
         noise = error * per * np.sqrt(1 + 1 / self.rest_count)
         sigma = np.hypot(noise, self.scatter * pressure)
-        given = _known(sigma) & self.alive & np.isfinite(ratio) & self._same_sign(siemens)
+        given = _known(sigma) & self.own & np.isfinite(ratio) & self._same_sign(siemens)
         if calibration:
             by += f"; {calibration.law.form.words()} of each element, calibrated"
             mean, half = calibration.of_ratio(ratio, time_s, calibration.counted(day), past)
             pressure, sigma = PA_PER_KPA * mean, PA_PER_KPA / NORMAL_90 * half
         shown, error_kpa = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
-        return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration)
+        return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration, self.faults)
 
 
 @dataclass(frozen=True, eq=False)

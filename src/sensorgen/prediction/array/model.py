@@ -22,7 +22,7 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.error_budget import modulus_range
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.sensor_model import SensorModel
-from sensorgen.scene.unit_cell import Band, SectionCell, Slice
+from sensorgen.scene.repetition import Band, SectionCell, Slice
 from sensorgen.solvers.cover import ElasticLayer, kernel
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.triangles import insulated

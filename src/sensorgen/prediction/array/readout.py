@@ -3,10 +3,11 @@
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.core.arrays import Complex, Mask, Real, Whole
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.prediction.array.model import SHORT_OHM, ArrayModel
 from sensorgen.solvers.tracks import CrossingReadings, Tracks, readings
@@ -16,6 +17,7 @@ MOST_DENSE = 2000  # crossings of which the information is a whole matrix; beyon
 FULL_SCALE_PA = 1103e3  # prior standard deviation of a pressure: full scale of a Tekscan HR mat 7101E
 _TAUS = 7.0  # time constants of the slowest track until a reading is within 0.1 %
 _PERIODS = 10.0  # of the lowest frequency that a reading takes
+_LOOSE = 2  # crossings at the end of a track that read nothing, where it is broken
 _SHORT, _BREAK = re.compile(r"r(\d+)c(\d+)"), re.compile(r"([rc])(\d+):(\d+)")
 
 
@@ -160,6 +162,36 @@ def _with_fault(tracks: Tracks, word: str, here: Mask) -> Tracks:
         f"fault {word!r:.40}: expected r3:5 (row 3 broken behind column 5; :0 its lead), c2:1, or r2c4 (a short), of "
         f"{m} rows and {n} columns"
     )
+
+
+def broken_where_dead(tracks: Tracks, here: Mask, dead: Mask) -> Tracks:
+    """A network whose tracks are broken where all crossings from some place to an end of a track are dead.
+
+    The loose part still joins what crosses it: beside a short, crossings read each other's loads through it. Of a
+    single dead crossing nothing is joined.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Without breaks.
+    here, dead : (m, n) array of bool
+        Crossings of the array, and those that read nothing.
+    """
+    sides: tuple[tuple[Literal["row", "column"], Mask, Mask, Whole], ...] = (
+        ("row", here, dead, tracks.row_end), ("column", here.T, dead.T, tracks.column_end)
+    )  # fmt: skip
+    for side, of, off, ends in sides:
+        for track in np.flatnonzero((of & off).sum(1) >= _LOOSE).tolist():
+            at, end = np.flatnonzero(of[track]), int(ends[track])
+            if off[track, at].all():
+                tracks = tracks.broken(side, track, -1)
+                continue
+            for out, before in ((at[at > end], 1), (at[at < end][::-1], 0)):
+                alive = np.flatnonzero(~off[track, out])
+                loose = out[alive[-1] + 1 if alive.size else 0 :]
+                if loose.size >= _LOOSE:
+                    tracks = tracks.broken(side, track, int(loose[0]) - before)
+    return tracks
 
 
 def _stretches(tracks: Tracks) -> int:

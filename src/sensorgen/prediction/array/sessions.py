@@ -30,7 +30,7 @@ from sensorgen.prediction.array.elements import (
     scale_of,
     sums_of,
 )  # fmt: skip
-from sensorgen.prediction.inverse.verdict import NORMAL_90
+from sensorgen.prediction.inference import NORMAL_90
 
 LEVEL = 0.9
 TAUS_S = (10.0, 30.0, 100.0, 300.0)
@@ -57,7 +57,7 @@ class ArrayCalibration:
     reach : float
         Half-width of the interval of ``LEVEL`` in that error [-].
     common : float
-        Relative error of a session's gain, of all elements at once: of the total force [-].
+        Relative error of the pressures of all elements at once, from frame to frame: of the total force [-].
     tares : (sessions, n) array
         Of the sessions that trained.
     quiet : (n,) array
@@ -274,9 +274,9 @@ def calibrated(sessions: Sequence[ArraySession], form: "LawForm | None" = None) 
         _residuals(session, law_of(training(sessions, k), form) if several else law)
         for k, session in enumerate(sessions)
     ]
-    gains = [float(off @ mean) / (float(mean @ mean) or 1.0) for off, mean, _ in errors]
-    common = float(np.sqrt(np.mean(np.square(gains))))
-    off, mean, sigma = (np.concatenate(each) for each in zip(*errors, strict=True))
+    off_pairs, mean_pairs = np.sum([pairs for *_, pairs in errors], 0).tolist()
+    common = float(np.sqrt(max(off_pairs, 0.0) / (mean_pairs or 1.0) * (1 + 1 / len(sessions))))  # of one session more
+    off, mean, sigma = (np.concatenate(each) for each in list(zip(*errors, strict=True))[:3])
     names = sessions[0].names
     if not off.size:  # total forces alone: the parameters' covariance is what is known
         return ArrayCalibration(law, 0.0, 0.0, NORMAL_90, common, tares, quiet, names)
@@ -285,15 +285,21 @@ def calibrated(sessions: Sequence[ArraySession], form: "LawForm | None" = None) 
     return ArrayCalibration(law, floor, share, reach, common, tares, quiet, names)
 
 
-def _residuals(session: ArraySession, law: ElementLaw) -> tuple[Real, Real, Real]:
-    """Errors, pressures and standard errors by the parameters, of loaded frames evenly taken [kPa]."""
+def _residuals(session: ArraySession, law: ElementLaw) -> tuple[Real, Real, Real, Real]:
+    """Errors, pressures and standard errors by the parameters, of loaded frames evenly taken [kPa].
+
+    And sums over frames of the products of two different elements' errors, and of their pressures, (2,) [kPa2]: what
+    the first has is alike in all elements.
+    """
     mean, sigma = law.pressures(session)
     size = np.abs(session.pressure_kpa)
     with np.errstate(invalid="ignore"):
         known = (size > UNLOADED * np.nanmax(size, initial=0.0)) & np.isfinite(mean)
     step = max(1, len(mean) // _FRAMES)
-    off = np.where(known, mean - session.pressure_kpa, 0.0)[::step][known[::step]]
-    return off, mean[::step][known[::step]], sigma[::step][known[::step]]
+    every = np.stack([np.where(known, of, 0.0) for of in (mean - session.pressure_kpa, mean)])
+    pairs = (every.sum(2) ** 2 - (every**2).sum(2)).sum(1)
+    known = known[::step]
+    return every[0, ::step][known], mean[::step][known], sigma[::step][known], pairs
 
 
 def _scale(squares: Real, mean: Real) -> tuple[float, float]:

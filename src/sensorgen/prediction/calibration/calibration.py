@@ -19,9 +19,8 @@ from sensorgen.prediction.calibration.inversion import OTHERWISE, InvertedPresse
 from sensorgen.prediction.calibration.materials import Link, MaterialEstimate, estimate, source_text
 from sensorgen.prediction.calibration.rest import Baseline
 from sensorgen.prediction.calibration.specimen import FORCES_N, Presses, SpecimenModel, Spread
-from sensorgen.prediction.inference import Parameter
+from sensorgen.prediction.inference import NORMAL_90, Parameter
 from sensorgen.prediction.inverse.estimator import Prior
-from sensorgen.prediction.inverse.verdict import NORMAL_90
 
 FOLDS = 5
 FEWEST = 10  # presses, with which the others still calibrate

@@ -17,10 +17,10 @@ from sensorgen.core.errors import BadInput
 from sensorgen.prediction.calibration.fitting import Posterior, pairs, readings, usual_presses
 from sensorgen.prediction.calibration.rest import STALE_S
 from sensorgen.prediction.calibration.specimen import SpecimenModel
-from sensorgen.prediction.inference import Index, Samples, cramer_rao, parts, whitening
+from sensorgen.prediction.inference import NORMAL_90, Index, Samples, cramer_rao, parts, whitening
 from sensorgen.prediction.inverse.estimator import Prior
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
-from sensorgen.prediction.inverse.verdict import NORMAL_90, Worded, chi2_limit
+from sensorgen.prediction.inverse.verdict import Worded, chi2_limit
 
 LEVEL = 0.9  # probability of the intervals
 _COARSE = 20, 16  # forces and positions at which covariances are worked out

@@ -15,7 +15,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design
-from sensorgen.design.materials import own
+from sensorgen.design.materials import SourceValue, source_file
 from sensorgen.design.values import film, ln_spread, material_value
 from sensorgen.prediction.calibration.fitting import Posterior
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel
@@ -106,11 +106,11 @@ def source_text(about: str, estimates: Sequence[MaterialEstimate]) -> str:
     told = [one for one in estimates if one.told]
     if not told:
         raise BadInput(f"{about}: the readings tell no material value; known presses tell them")
-    materials: dict[str, list[own.SourceValue]] = {}
+    materials: dict[str, list[SourceValue]] = {}
     for one in told:
-        value = own.SourceValue(one.quantity, one.value, one.lower, one.upper)
+        value = SourceValue(one.quantity, one.value, one.lower, one.upper)
         materials.setdefault(one.material, []).append(value)
-    return own.written(about, materials)
+    return source_file(about, materials)
 
 
 def links(predicted: SensorModel) -> tuple[Link, ...]:

@@ -17,9 +17,8 @@ from sensorgen.design.design import Design
 from sensorgen.models import line
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import bodies
-from sensorgen.prediction.inference import Parameter, Samples, parts, slopes
+from sensorgen.prediction.inference import NORMAL_90, Parameter, Samples, parts, slopes
 from sensorgen.prediction.inverse.forward import Forward, tones
-from sensorgen.prediction.inverse.verdict import NORMAL_90
 from sensorgen.prediction.query import TONES_HZ, Query, Tip
 from sensorgen.prediction.sensor_model import SensorModel, sensor_model
 
@@ -339,7 +338,7 @@ def _shares(ln_force: Real) -> Real:
     return np.asarray(np.maximum(0.0, 1 - np.abs(place[..., None] - np.arange(len(FORCES_N)))))
 
 
-_SURE = 2 * NORMAL_90  # widths of a 90 % interval, in standard deviations
+SURE = 2 * NORMAL_90  # widths of a 90 % interval, in standard deviations
 
 
 @dataclass(frozen=True)
@@ -383,8 +382,8 @@ def spread_of(predicted: SensorModel, bench: Bench) -> Spread:
     middle, by_print, by_print_shape = print_spread(predicted)
     return replace(
         usual, force_n=sd, force_offset_n=mean,
-        resistance=max(usual.resistance, float(np.ptp(ends)) / _SURE) if ends else usual.resistance,
-        capacitance=max(usual.capacitance, float(np.log(c.upper / c.lower)) / _SURE),
+        resistance=max(usual.resistance, float(np.ptp(ends)) / SURE) if ends else usual.resistance,
+        capacitance=max(usual.capacitance, float(np.log(c.upper / c.lower)) / SURE),
         law=hypot(usual.law if moduli else 2 * usual.law, by_print), law_middle=middle,
         law_shape=hypot(usual.law_shape, by_print_shape),
     )  # fmt: skip
@@ -406,7 +405,7 @@ def print_spread(predicted: SensorModel) -> tuple[float, float, float]:
     gaps = [gap for gap in cells.gap_mm.values() if error < gap < np.inf]
     if first in gaps:
         ends += [2 * log(first / end) for end in (min(gaps) - error, max(gaps) + error)]
-    return (max(ends) + min(ends)) / 2, (max(ends) - min(ends)) / _SURE, float(np.ptp(by_drawing)) / _SURE
+    return (max(ends) + min(ends)) / 2, (max(ends) - min(ends)) / SURE, float(np.ptp(by_drawing)) / SURE
 
 
 def _ln_rise_as_drawn(predicted: SensorModel) -> Real:

@@ -15,9 +15,9 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import inference
-from sensorgen.prediction.inference import Index, LocalFit, Samples, parts
+from sensorgen.prediction.inference import NORMAL_90, Index, LocalFit, Samples, parts
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Forward, Local, ResponseTable
-from sensorgen.prediction.inverse.verdict import NORMAL_90, PAIR, Status, covariance, statuses
+from sensorgen.prediction.inverse.verdict import PAIR, Status, covariance, statuses
 
 LOOSE, TIGHT = 0.2, 0.01  # share of the residual that a step still removes when a sample is done (Bates and Watts 1981)
 REACH = 0.1  # farthest that one step moves the position: beyond it the response is not linear

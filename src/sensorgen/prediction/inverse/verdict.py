@@ -85,7 +85,6 @@ def _row(cells: Sequence[str]) -> str:
     return ",".join(cells) + "\n"
 
 
-NORMAL_90 = 1.6448536269514722  # normal deviate of 5 %
 PAIR = 9.21  # 99 % of chi-squared with two degrees of freedom: force and position
 _TAIL = 3.719  # normal deviate of 1e-4
 _ROUNDING = np.finfo(float).eps

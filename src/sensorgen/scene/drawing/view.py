@@ -185,24 +185,35 @@ def _lanes(measures: Iterable[Measure]) -> list[list[Measure]]:
 
 def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
     """Horizontal measures in rows from the sensor outwards: those above the view, and those below it."""
-    middle = _reach(view, None, max) / 2
-    columns = [*(column.left_mm for column in view.columns), view.columns[-1].right_mm]  # where nothing repeats
-    edges = [u for u in view.period_mm or columns if u <= view.end_mm + SAME_MM]
+    middle, edges = _reach(view, None, max) / 2, _edges(view)
     lowest = [_reach(view, u, min) for u in edges]
     above = bool(edges) and min(lowest) > middle
-    reach = [_reach(view, u, max) for u in edges] if above else lowest
-    steps = [Measure(a, b, ends) for (a, b), ends in zip(pairwise(edges), pairwise(reach), strict=True)]
-    steps = steps if 1 < len(steps) <= MOST_COLUMNS else []
-    repeats = view.period_mm and len(edges) == len(view.period_mm)  # the view shows all of a period
-    whole = [Measure(edges[0], edges[-1], (reach[0], reach[-1]))] if repeats else []
+    steps, whole = _columns(view, edges, [_reach(view, u, max) for u in edges] if above else lowest)
     known = [*steps, *whole, Measure(0.0, view.end_mm)]
     pieces = _new(_flats(view), known, by_value=True)[:MOST_PIECES]
-    rows: tuple[list[list[Measure]], list[list[Measure]]] = ([], [])
-    rows[not above].append(steps)
-    for measure in pieces:
-        rows[measure.ends_mm[0] <= middle].append([measure])
-    rows[not above].append(whole)
-    return [row for row in rows[0] if row], [row for row in rows[1] if row]
+    upper, lower = ([[m] for m in pieces if (m.ends_mm[0] > middle) == is_upper] for is_upper in (True, False))
+    if above:
+        return _filled([steps, *upper, whole]), lower
+    return upper, _filled([steps, *lower, whole])
+
+
+def _columns(view: View, edges: Sequence[float], reach: Sequence[float]) -> tuple[list[Measure], list[Measure]]:
+    """Widths of the columns, unless there are too many, and of a period, where the view shows all of it."""
+    steps = [Measure(a, b, ends) for (a, b), ends in zip(pairwise(edges), pairwise(reach), strict=True)]
+    repeats = view.period_mm and len(edges) == len(view.period_mm)
+    whole = [Measure(edges[0], edges[-1], (reach[0], reach[-1]))] if repeats else []
+    return steps if 1 < len(steps) <= MOST_COLUMNS else [], whole
+
+
+def _edges(view: View) -> list[float]:
+    """Edges of the columns of a period, or of all columns where nothing repeats, as far as the view goes [mm]."""
+    columns = [*(column.left_mm for column in view.columns), view.columns[-1].right_mm]
+    return [u for u in view.period_mm or columns if u <= view.end_mm + SAME_MM]
+
+
+def _filled(rows: Iterable[list[Measure]]) -> list[list[Measure]]:
+    """Rows that have a measure."""
+    return [row for row in rows if row]
 
 
 def _flats(view: View) -> list[Measure]:

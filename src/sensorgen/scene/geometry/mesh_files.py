@@ -169,6 +169,11 @@ class _Model:
     colours: dict[tuple[str, str], list[tuple[str, str]]] = field(default_factory=dict)
     built: list[tuple[tuple[str, str], Real]] = field(default_factory=list)
 
+    def colour(self, group: tuple[str, str], number: int) -> str:
+        """Colour of a group by its number there; "" where it is not known."""
+        colours = self.colours.get(group, [])
+        return colours[number][1] if 0 <= number < len(colours) else ""
+
 
 def read_3mf(path: Path, unit: str = "") -> list[FileBody]:
     """Bodies of a 3MF: one for each object that has triangles, or each volume that a slicer has named.
@@ -297,17 +302,19 @@ def _bodies(
         yield from _bodies(model, part, moved, parts, depth + 1)
     if not one.triangles:
         return
+    points, faces = _placed(one, key[1], where)
+    for first, last, name in parts.get(key[1]) or [(0, len(faces), one.name)]:
+        colour = model.colour((key[0], one.colour[0]), one.materials[first])
+        yield FileBody(name, points, faces[first : last + 1], colour)
+
+
+def _placed(one: _Object, number: str, where: Real) -> tuple[Real, Whole]:
+    """Corners and triangles of an object in its place, which may mirror it."""
     points = np.array(one.vertices, float).reshape(-1, 3) @ where[:3] + where[3]
     faces = np.array(one.triangles, np.int64)
     if faces.min() < 0 or faces.max() >= len(points):
-        raise BadInput(f"object {key[1]} has a triangle of a vertex that it does not have")
-    if np.linalg.det(where[:3]) < 0:
-        faces = faces[:, ::-1]
-    known = model.colours.get((key[0], one.colour[0]), [])
-    for first, last, name in parts.get(key[1]) or [(0, len(faces), one.name)]:
-        paint = one.materials[first]
-        colour = known[paint][1] if 0 <= paint < len(known) else ""
-        yield FileBody(name, points, faces[first : last + 1], colour)
+        raise BadInput(f"object {number} has a triangle of a vertex that it does not have")
+    return points, faces[:, ::-1] if np.linalg.det(where[:3]) < 0 else faces
 
 
 def _parts(archive: zipfile.ZipFile) -> dict[str, list[_Range]]:

@@ -334,10 +334,7 @@ def _body(shape: Any, name: str, colour: Any, chord_mm: float) -> "FileBody":
     """Triangles of a part, face by face; corners that faces share are there once for each."""
     import numpy as np
     from build123d import GeomType
-    from OCP.BRep import BRep_Tool
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.TopAbs import TopAbs_Orientation
-    from OCP.TopLoc import TopLoc_Location
 
     from sensorgen.scene.geometry.mesh_files import FileBody
 
@@ -346,22 +343,9 @@ def _body(shape: Any, name: str, colour: Any, chord_mm: float) -> "FileBody":
     triangles: list[Any] = []
     faces = shape.faces()
     for face in faces:
-        place = TopLoc_Location()
-        mesh = BRep_Tool.Triangulation_s(face.wrapped, place)
-        if mesh is None:
-            if face.area < _NO_AREA_MM2:  # as revolved axes leave
-                continue
-            x, y, z = tuple(face.center())
-            raise BadInput(
-                f"{name or 'a body'}: its curved face near x {x:.6g}, y {y:.6g}, z {z:.6g} mm cannot be met by "
-                "triangles: it crosses itself; draw it anew in CAD"
-            )
-        backwards = face.wrapped.Orientation() == TopAbs_Orientation.TopAbs_REVERSED
-        to, first = place.Transformation(), len(points)
-        corners = (mesh.Node(k).Transformed(to) for k in range(1, mesh.NbNodes() + 1))
-        points += [(corner.X(), corner.Y(), corner.Z()) for corner in corners]
-        numbers = [[t.Value(k) - 1 + first for k in (1, 2, 3)] for t in mesh.Triangles()]
-        triangles += [number[::-1] for number in numbers] if backwards else numbers
+        corners, numbers = _of_face(face, name)
+        triangles += [[k + len(points) for k in number] for number in numbers]
+        points += corners
     _refuse_missing(shape, name, points, triangles, chord_mm)
     curved = any(face.geom_type != GeomType.PLANE for face in faces)
     paint = "#" + "".join(f"{round(255 * value):02x}" for value in tuple(colour)[:3]) if colour is not None else ""
@@ -369,6 +353,29 @@ def _body(shape: Any, name: str, colour: Any, chord_mm: float) -> "FileBody":
         name, np.array(points, float).reshape(-1, 3), np.array(triangles, np.int64).reshape(-1, 3), paint, 1e-7,
         chord_mm if curved else 0.0, _recognised(shape) if curved else None,
     )  # fmt: skip
+
+
+def _of_face(face: Any, name: str) -> tuple[list[tuple[float, float, float]], list[list[int]]]:
+    """Corners of a face's triangles, and their numbers; none of a face without an area, as revolved axes leave."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_Orientation
+    from OCP.TopLoc import TopLoc_Location
+
+    place = TopLoc_Location()
+    mesh = BRep_Tool.Triangulation_s(face.wrapped, place)
+    if mesh is None:
+        if face.area < _NO_AREA_MM2:
+            return [], []
+        x, y, z = tuple(face.center())
+        raise BadInput(
+            f"{name or 'a body'}: its curved face near x {x:.6g}, y {y:.6g}, z {z:.6g} mm cannot be met by "
+            "triangles: it crosses itself; draw it anew in CAD"
+        )
+    to = place.Transformation()
+    corners = (mesh.Node(k).Transformed(to) for k in range(1, mesh.NbNodes() + 1))
+    order = (3, 2, 1) if face.wrapped.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else (1, 2, 3)
+    triangles = [[triangle.Value(k) - 1 for k in order] for triangle in mesh.Triangles()]
+    return [(corner.X(), corner.Y(), corner.Z()) for corner in corners], triangles
 
 
 def _profile_corner(edge: Any, axis_mm: float, *, arc: bool) -> tuple[tuple[float, float], float]:
@@ -382,21 +389,12 @@ def _profile_corner(edge: Any, axis_mm: float, *, arc: bool) -> tuple[tuple[floa
 
 def _recognised(shape: Any) -> "Revolved | None":
     """A part as a body of revolution about an upright axis, where its profile of lines and arcs says that it is one."""
-    from build123d import Face, GeomType, Plane, Pos
+    from build123d import GeomType
 
     from sensorgen.scene.revolved import Revolved
 
-    box = shape.bounding_box()
-    middle, size = box.center(), box.size
-    if len(shape.solids()) != 1 or abs(size.X - size.Y) > 1e-6:
-        return None
-    half = Pos(middle.X + size.X, middle.Y, middle.Z) * Face.make_rect(2 * size.X, 2 * size.Z, Plane.XZ)
-    cut = shape.solids()[0].intersect(half)
-    faces = cut.faces() if cut is not None else []
-    if len(faces) != 1 or faces[0].inner_wires():
-        return None
-    edges = faces[0].outer_wire().order_edges()
-    if any(edge.geom_type not in (GeomType.LINE, GeomType.CIRCLE) for edge in edges):
+    middle, edges = shape.bounding_box().center(), _profile(shape)
+    if not edges or any(edge.geom_type not in (GeomType.LINE, GeomType.CIRCLE) for edge in edges):
         return None
     outline, bulges = zip(
         *(_profile_corner(edge, middle.X, arc=edge.geom_type == GeomType.CIRCLE) for edge in edges), strict=True
@@ -407,6 +405,20 @@ def _recognised(shape: Any) -> "Revolved | None":
         return None
     exact = shape.solids()[0].volume
     return piece if abs(piece.volume_mm3() - exact) < 1e-6 * exact else None
+
+
+def _profile(shape: Any) -> list[Any]:
+    """Edges of a single solid's half section beside its upright axis; none where that is no one ring."""
+    from build123d import Face, Plane, Pos
+
+    box = shape.bounding_box()
+    middle, size = box.center(), box.size
+    if len(shape.solids()) != 1 or abs(size.X - size.Y) > 1e-6:
+        return []
+    half = Pos(middle.X + size.X, middle.Y, middle.Z) * Face.make_rect(2 * size.X, 2 * size.Z, Plane.XZ)
+    cut = shape.solids()[0].intersect(half)
+    faces = cut.faces() if cut is not None else []
+    return list(faces[0].outer_wire().order_edges()) if len(faces) == 1 and not faces[0].inner_wires() else []
 
 
 def _refuse_missing(shape: Any, name: str, points: Any, triangles: Any, chord_mm: float) -> None:

@@ -83,13 +83,7 @@ def closed(vertices_mm: Real, triangles: Whole, weld_mm: float = WELD_MM) -> Clo
     if not np.isfinite(vertices_mm).all():
         bad = vertices_mm[~np.isfinite(vertices_mm).all(1)]
         return Closed((), (), (SurfaceFault(f"{len(bad)} corners are no numbers", "export it again", (0.0, 0.0, 0.0)),))
-    points, faces = _welded(vertices_mm, triangles, weld_mm)
-    repairs = []
-    if len(_open(faces)) and weld_mm < GAP_MM:
-        nearer = _welded(vertices_mm, triangles, GAP_MM)
-        if len(_open(nearer[1])) < len(_open(faces)):
-            points, faces = nearer
-            repairs.append(f"gaps of up to {GAP_MM:g} mm closed")
+    points, faces, repairs = _joined(vertices_mm, triangles, weld_mm)
     faces, twice = _once(faces)
     repairs += [f"{twice} faces that are there twice removed"] if twice else []
     faces, turned = _oriented(faces)
@@ -109,6 +103,16 @@ def closed(vertices_mm: Real, triangles: Whole, weld_mm: float = WELD_MM) -> Clo
 def _place(point: Real) -> Place:
     x, y, z = point.round(6).tolist()
     return x, y, z
+
+
+def _joined(points: Real, faces: Whole, weld_mm: float) -> tuple[Real, Whole, list[str]]:
+    """Corners within a distance as one, within ``GAP_MM`` where that leaves fewer openings; and what was repaired."""
+    near = _welded(points, faces, weld_mm)
+    if len(_open(near[1])) and weld_mm < GAP_MM:
+        wider = _welded(points, faces, GAP_MM)
+        if len(_open(wider[1])) < len(_open(near[1])):
+            return *wider, [f"gaps of up to {GAP_MM:g} mm closed"]
+    return *near, []
 
 
 def _welded(points: Real, faces: Whole, near_mm: float) -> tuple[Real, Whole]:
@@ -433,11 +437,9 @@ def _prisms(mesh: Mesh, axis: str, near_mm: float) -> tuple[Prism, ...]:
     levels = [_rounded(float(value)) for value in starts]
     region, prisms = shapely.Polygon(), []
     growing: dict[Outline, float] = {}
-    faces = defaultdict(list)
-    for number, place, looks_up in zip(caps.tolist(), at.tolist(), (normal[caps] > 0).tolist(), strict=True):
-        faces[place, looks_up].append(number)
     for n, low in enumerate(levels[:-1]):
-        added, gone = (_region(mesh, faces[n, up], plane, near_mm) for up in (False, True))
+        here = caps[at == n]
+        added, gone = (_region(mesh, here[(normal[here] > 0) == up], plane, near_mm) for up in (False, True))
         region = shapely.union(shapely.difference(region, gone, grid_size=_GRID_MM), added, grid_size=_GRID_MM)
         now = {outline: growing.pop(outline, low) for outline in outlines(region)}
         prisms += [_prism(axis, outline, start, low) for outline, start in growing.items()]
@@ -448,7 +450,7 @@ def _prisms(mesh: Mesh, axis: str, near_mm: float) -> tuple[Prism, ...]:
     return tuple(sorted(prisms, key=lambda p: (p.start_mm, p.outline)))
 
 
-def _region(mesh: Mesh, faces: Sequence[int], plane: Sequence[int], near_mm: float) -> shapely.Geometry:
+def _region(mesh: Mesh, faces: Whole, plane: Sequence[int], near_mm: float) -> shapely.Geometry:
     """Region that level faces cover, by the edges that only one of them has."""
     edges = mesh.edges().reshape(-1, 3, 2)[faces].reshape(-1, 2)
     _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)

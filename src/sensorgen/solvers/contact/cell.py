@@ -9,9 +9,9 @@ from typing import TypeVar
 import shapely
 
 from sensorgen.core.errors import BadInput
+from sensorgen.scene.repetition import Slice, cut, repeats, slices, straightened
 from sensorgen.scene.scene import Point, Scene
 from sensorgen.scene.sections import sections
-from sensorgen.scene.unit_cell import Slice, cut, repeats, slices, straightened
 
 OUTSIDE = 0  # the region beyond the cell
 AIR = "air"
@@ -60,9 +60,13 @@ class ContactCell:
         """Width [mm]."""
         return self.right_mm - self.left_mm
 
+    def blocks(self) -> set[int]:
+        """Regions of a block on its top."""
+        return {k for k, region in enumerate(self.regions, 1) if region.material == BLOCK}
+
     def without_block(self) -> "ContactCell":
         """The cell without the block on its top."""
-        own = [k for k, region in enumerate(self.regions, 1) if region.material == BLOCK]
+        own = self.blocks()
         edges = {edge: tuple(OUTSIDE if k in own else k for k in sides) for edge, sides in self.edges.items()}
         return replace(self, edges={edge: (a, b) for edge, (a, b) in edges.items() if a != b})
 
@@ -74,6 +78,10 @@ class ContactCell:
     def solid(self, region: int) -> bool:
         """Test whether a region is filled by a body."""
         return region != OUTSIDE and self.regions[region - 1].material != AIR
+
+    def faces(self) -> dict[Edge, tuple[int, int]]:
+        """Edges with a body on one side only, as in ``edges``."""
+        return {e: sides for e, sides in self.edges.items() if self.solid(sides[0]) != self.solid(sides[1])}
 
 
 Strip = tuple[float, float, list[tuple[Region, Point, Point]]]
@@ -94,13 +102,7 @@ def cell_of(scene: Scene, period_mm: float | None) -> ContactCell:
     BadInput
         The scene is no prism, or shorter than its period.
     """
-    try:
-        found = sections(scene)
-        whole = straightened(slices(found[0], 0.0, layered=True))
-    except ValueError as error:
-        raise BadInput(f"compression needs a prismatic scene: {error}") from None
-    if len(found) > 1:
-        raise BadInput(f"compression needs one cross-section; this scene has {len(found)}: it must be solved in 3D")
+    whole = _only_section(scene)
     start, end = whole[0].left_mm, whole[-1].right_mm
     period = period_mm or (min(end - start, max(whole[0].bands[-1].top_mm)) if len(whole) == 1 else end - start)
     if period > (end - start) * (1 + 1e-9):
@@ -111,6 +113,18 @@ def cell_of(scene: Scene, period_mm: float | None) -> ContactCell:
         if stop <= end + _SLIVER_MM and repeats(cut(whole, axis, stop), axis, middle):
             return between(whole, axis, middle, mirrored=True)
     return between(whole, start, start + period, mirrored=False)
+
+
+def _only_section(scene: Scene) -> list[Slice]:
+    """Slices of a scene's cross-section; raises BadInput where it is no prism, or has several."""
+    try:
+        every = sections(scene)
+        whole = straightened(slices(every[0], 0.0, layered=True))
+    except ValueError as error:
+        raise BadInput(f"compression needs a prismatic scene: {error}") from None
+    if len(every) > 1:
+        raise BadInput(f"compression needs one cross-section; this scene has {len(every)}: it must be solved in 3D")
+    return whole
 
 
 def between(whole: Sequence[Slice], left: float, right: float, *, mirrored: bool) -> ContactCell:
@@ -204,10 +218,13 @@ def _uprights(
     sides = [_spans(before, 1, number), _spans(after, 0, number)]
     heights = sorted({v for spans in sides for low, high, _ in spans for v in (low, high)})
     for low, high in pairwise(heights):
-        middle = (low + high) / 2
-        left, right = (next((r for a, b, r in spans if a < middle < b), OUTSIDE) for spans in sides)
+        left, right = (_region_at(spans, (low + high) / 2) for spans in sides)
         if left or right:
             edges[_rounded((place, low)), _rounded((place, high))] = (left, right)
+
+
+def _region_at(spans: Sequence[tuple[float, float, int]], height: float) -> int:
+    return next((region for low, high, region in spans if low < height < high), OUTSIDE)
 
 
 def _spans(strip: Strip | None, end: int, number: Mapping[Region, int]) -> list[tuple[float, float, int]]:

@@ -249,15 +249,11 @@ def _edges(cell: ContactCell, mesh: TriangleMesh) -> Sides:
             mesh.outer[:, [k, k + 3, (k + 1) % 3]].tolist(), mesh.region.tolist(), strict=True
         ):
             for p, q in ((a, b),) if m in walls else ((a, m), (m, b)):
-                if (q, p) in sides_of:
-                    sides_of[q, p] = (sides_of[q, p][0], region)
-                else:
-                    sides_of[p, q] = (region, OUTSIDE)
-    for a, b, m in mesh.rim[~at_border(mesh)].tolist():
-        for run in ((a, m), (m, b)):
-            sides_of[run] = (sides_of[run][0], air)
+                add(sides_of, p, q, (region, OUTSIDE))
+    for p, q in mesh.outline[np.tile(~at_border(mesh), 2)].tolist():
+        add(sides_of, p, q, (OUTSIDE, air))
     nodes = {tuple(np.round(p / M_PER_MM, 9).tolist()): k for k, p in enumerate(mesh.points_m)}
-    for (p, q), sides in cell.edges.items():
+    for (a, b), sides in cell.edges.items():
         if air != OUTSIDE and set(sides) == {air, OUTSIDE}:
-            sides_of[nodes[p], nodes[q]] = sides
+            add(sides_of, nodes[a], nodes[b], sides)
     return borders(sides_of)

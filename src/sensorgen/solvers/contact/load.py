@@ -207,16 +207,20 @@ class Problem:
             if step is None:
                 return None
             du = self.free @ step
-            inside = local.inner_step(du[self.elements.freedoms])
-            for share in _SHARES:
-                there = u + share * du, inner.moved(inside, share)
-                if self.elements.volume_ratio(*there).min() > _LEAST_J:
-                    break
-            else:
+            moved = self._moved(u, inner, du, local.inner_step(du[self.elements.freedoms]))
+            if moved is None:
                 return None
-            u, inner = there
+            u, inner = moved
             if np.abs(du).max() <= _STILL * np.abs(u).max() and local.imbalance() < _NEARLY:
                 return State(pressure_pa, u, inner, pairs)
+        return None
+
+    def _moved(self, u: Real, inner: Inner, du: Real, inside: Real) -> tuple[Real, Inner] | None:
+        """Displacements after a step of Newton's method, or so much of it that no element is squeezed too far."""
+        for share in _SHARES:
+            moved = u + share * du, inner.moved(inside, share)
+            if self.elements.volume_ratio(*moved).min() > _LEAST_J:
+                return moved
         return None
 
     def extrapolated(self, state: State, before: State, pressure_pa: float) -> State:
@@ -241,24 +245,31 @@ class Problem:
         start = self.extrapolated(state, before, pressure_pa)
         starts = [start] if start is state else [start, state]
         tries = (self.newton(start, pressure_pa, state.pairs, _NEARLY) for start in starts)
-        reached = next((done for done in tries if done), None)
+        reached = next(filter(None, tries), None)
         if reached is None:
             return None
         stuck = self._stuck(state.u_m, reached) if self.stick else None
-        pairs = self.project(reached.u_m, stuck)
+        reached = self._updated(reached, stuck, keeps=keeps and self.sound is not None)
+        return reached if reached and (self.sound is None or self.sound(self.places(reached.u_m))) else None
+
+    def _updated(self, reached: State, stuck: FacePairs | None, *, keeps: bool) -> State | None:
+        """Equilibrium with pairs that are updated and settled; None where some have none, unless the last ones stay."""
+        pressure_pa, pairs = reached.pressure_pa, self.project(reached.u_m, stuck)
         for _ in range(self.updates):
             again = self.newton(reached, pressure_pa, pairs, _ENOUGH)
             if again is None:
-                stays = keeps and self.sound is not None
-                reached = self.newton(reached, pressure_pa, reached.pairs, _ENOUGH) if stays else None
-                break
+                return self.newton(reached, pressure_pa, reached.pairs, _ENOUGH) if keeps else None
             reached, pairs = again, self.project(again.u_m, stuck)
-            depths = np.zeros((2, 1 + max(p.point.max(initial=0) for p in (reached.pairs, pairs))))
-            for depth, seen in zip(depths, (reached.pairs, pairs), strict=True):
-                depth[seen.point] = np.maximum(-self.gaps(seen, reached.u_m), 0.0) / seen.length_m
-            if np.ptp(depths, axis=0).max() < self.settled:
+            if self._change(reached, pairs) < self.settled:
                 break
-        return reached if reached and (self.sound is None or self.sound(self.places(reached.u_m))) else None
+        return reached
+
+    def _change(self, state: State, pairs: FacePairs) -> float:
+        """Largest change of penetration over a side's length by other pairs [-]."""
+        depths = np.zeros((2, 1 + max(p.point.max(initial=0) for p in (state.pairs, pairs))))
+        for depth, seen in zip(depths, (state.pairs, pairs), strict=True):
+            depth[seen.point] = np.maximum(-self.gaps(seen, state.u_m), 0.0) / seen.length_m
+        return float(np.ptp(depths, axis=0).max())
 
     def _stuck(self, before: Real, state: State) -> FacePairs:
         """Pairs that touch now and stick from where they first did, between the displacements before and those now."""

@@ -1,5 +1,6 @@
 """Mesh of quadratic triangles of a cell's solid parts, refined at notches and where two of them meet in a point."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -11,7 +12,7 @@ from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Point
 from sensorgen.solvers.contact import mesher
-from sensorgen.solvers.contact.cell import BLOCK, OUTSIDE, ContactCell, Edge, joined
+from sensorgen.solvers.contact.cell import OUTSIDE, ContactCell, Edge, joined
 from sensorgen.solvers.contact.element import TRIANGLE, ElementMesh
 
 Run = tuple[int, int]
@@ -86,12 +87,8 @@ def at_border(mesh: TriangleMesh) -> Mask:
 
 def pinches(cell: ContactCell) -> set[Point]:
     """Points in which solids touch: four edges of solids meet there, mirrors among them."""
-    seen: dict[Point, int] = {}
-    for edge, sides in cell.edges.items():
-        if cell.solid(sides[0]) != cell.solid(sides[1]):
-            for point in edge:
-                seen[point] = seen.get(point, 0) + 1
-    return {point for point, edges in seen.items() if edges >= 4}
+    count = Counter(point for edge in cell.faces() for point in edge)
+    return {point for point, edges in count.items() if edges >= 4}
 
 
 @dataclass(frozen=True)
@@ -126,45 +123,45 @@ def mesh_of(cell: ContactCell, fineness: Fineness) -> TriangleMesh:
     sharp = pinches(cell)
     if fineness.straight and not sharp:
         cell = replace(cell, edges=joined(cell.edges))
-    faces = [
-        e for e, sides in cell.edges.items() if OUTSIDE not in sides and cell.solid(sides[0]) != cell.solid(sides[1])
-    ]
-    exposed = {p for edge in faces for p in edge}
+    exposed = {p for edge, sides in cell.faces().items() if OUTSIDE not in sides for p in edge}
     sizes = dict.fromkeys(exposed, fineness.corner_mm) | dict.fromkeys(sharp, fineness.apex_mm)
-    blocks = {k for k, region in enumerate(cell.regions, 1) if region.material == BLOCK}
     wide = replace(fineness, coarse_mm=max(fineness.coarse_mm, _BLOCK * fineness.growth * cell.width_mm()))
-    pieces = _cut(cell, sizes, fineness, wide, blocks)
-    net = triangulated(pieces, fineness.coarse_mm, fineness.growth, dict.fromkeys(blocks, wide.coarse_mm))
+    pieces = _cut(cell, sizes, fineness, wide)
+    net = triangulated(pieces, fineness.coarse_mm, fineness.growth, dict.fromkeys(cell.blocks(), wide.coarse_mm))
     for place in sharp:
-        if cell.turned and _is_flat(cell, place):
+        if _is_flat(cell, place):
             net = _parted(net, nearest(net.points_m, place))
     tips = [nearest(net.points_m, place) for place in notches(cell)]
     return of_triangles(*ringed(net.points_m, net.corners, net.region, tips, _RINGS), turned=cell.turned)
 
 
 def _cut(
-    cell: ContactCell, sizes: Mapping[Point, float], fineness: Fineness, wide: Fineness, blocks: set[int]
+    cell: ContactCell, sizes: Mapping[Point, float], fineness: Fineness, wide: Fineness
 ) -> dict[Edge, tuple[int, int]]:
     """Pieces of the edges of solids, with their regions; of a block on the top they grow to ``wide``."""
     pieces: dict[Edge, tuple[int, int]] = {}
+    of_blocks = {OUTSIDE, *cell.blocks()}
     top_mm = max(z for edge in cell.edges for _, z in edge)
     for (a, b), sides in cell.edges.items():
-        of_block = blocks and set(sides) <= {OUTSIDE, *blocks}
-        far = [wide.coarse_mm if of_block and p[1] == top_mm else fineness.coarse_mm for p in (a, b)]
-        ends = [sizes.get(p, size) for p, size in zip((a, b), far, strict=True)]
+        of_block = of_blocks.issuperset(sides)
+        ends = [sizes.get(p, wide.coarse_mm if of_block and p[1] == top_mm else fineness.coarse_mm) for p in (a, b)]
         length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
         shares = cuts(length, ends[0], ends[1], wide if of_block else fineness)
-        places = [a, *((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])) for t in shares), b]
+        places = [a, *(_on_way(a, b, share) for share in shares), b]
         open_sides = (sides[0] * cell.solid(sides[0]), sides[1] * cell.solid(sides[1]))
         if open_sides != (OUTSIDE, OUTSIDE):
             pieces |= dict.fromkeys(pairwise(places), open_sides)
     return pieces
 
 
+def _on_way(a: Point, b: Point, share: float) -> Point:
+    return a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
+
+
 def _is_flat(cell: ContactCell, place: Point) -> bool:
-    """Test whether a dome and a level face meet at a point of the axis."""
+    """Test whether a dome and a level face meet at a point of the axis of a cell that is turned."""
     ends = [p if q == place else q for (p, q), sides in cell.edges.items() if place in (p, q) and cell.air in sides]
-    return place[0] == 0 and all(abs(z - place[1]) < _LEVEL * r for r, z in ends)
+    return cell.turned and place[0] == 0 and all(abs(z - place[1]) < _LEVEL * r for r, z in ends)
 
 
 def _parted(net: Net, node: int) -> Net:
@@ -238,11 +235,9 @@ def sharp_corners(edges: Mapping[Edge, tuple[int, int]], left_mm: float, right_m
 def notches(cell: ContactCell) -> list[Point]:
     """Where the solids fill more than half a turn around a corner; the walls of the cell are mirrors."""
     ways: dict[Point, list[tuple[float, bool]]] = {}
-    for edge, sides in cell.edges.items():
-        left, right = (cell.solid(side) for side in sides)
-        if left != right:
-            for (p, q), solid in ((edge, left), (edge[::-1], right)):
-                ways.setdefault(p, []).append((atan2(q[1] - p[1], q[0] - p[0]), solid))
+    for edge, sides in cell.faces().items():
+        for (p, q), side in zip((edge, edge[::-1]), sides, strict=True):
+            ways.setdefault(p, []).append((atan2(q[1] - p[1], q[0] - p[0]), cell.solid(side)))
     sharp = []
     for place, out_of in ways.items():
         if len(out_of) == 2:

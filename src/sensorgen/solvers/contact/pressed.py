@@ -220,13 +220,13 @@ def solve(
         solver = Solver(mesh.lattice[one // 3])
         problem = Problem(elements, brick_faces_of(mesh), free, load, penalty, stick, solver)
     ramp = [p for p in ramp if p < stress_pa[-1] and np.abs(np.divide(stress_pa, p) - 1).min() > _NEAR]
-    every = []
+    every, asked = [], []
     for state in curve(problem, sorted({*stress_pa, *ramp}), longest * softest):
         every.append(state)
         if state.pressure_pa in stress_pa:
+            asked.append(state)
             step(state.pressure_pa)
-    checked = _checked(problem, every, stress_pa, source)
-    return checked, LoadSteps(problem, mesh, [state for state in every if state.pressure_pa in stress_pa])
+    return _checked(problem, every, stress_pa, source), LoadSteps(problem, mesh, asked)
 
 
 def _checked(problem: "Problem", every: "Sequence[State]", stress_pa: Sequence[float], source: str) -> Pressed:
@@ -234,10 +234,10 @@ def _checked(problem: "Problem", every: "Sequence[State]", stress_pa: Sequence[f
 
     Work is summed over ``every`` load step, so that the balance does not depend on the loads asked for.
     """
-    asked = np.array([k for k, state in enumerate(every) if state.pressure_pa in stress_pa])
+    steps = np.array([s.pressure_pa for s in every])
+    asked = np.flatnonzero(np.isin(steps, stress_pa)).tolist()
     states, last_pa = [every[k] for k in asked], stress_pa[-1]
     area, fall = np.abs(problem.load).sum(), problem.fall_m(states[0])
-    steps = np.array([s.pressure_pa for s in every])
     moved = np.array([problem.load @ s.u_m / area for s in every])
     volume = np.array([problem.elements.volume_ratio(s.u_m, s.inner).min() for s in states])
     depth = np.array([-(problem.gaps(s.pairs, s.u_m) / s.pairs.length_m).min(initial=0.0) for s in states])

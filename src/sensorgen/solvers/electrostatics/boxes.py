@@ -149,7 +149,7 @@ def layered(coarse: Grid, values: Sequence[float], layers: int) -> Grid:
     for axis in range(3):
         first, second = (a for a in range(3) if a != axis)
         boxes = np.moveaxis(coarse.fill, axis, 2)
-        around = np.stack([boxes[i : i - 1 or None, j : j - 1 or None] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])
+        around = np.stack([boxes[:-1, :-1], boxes[1:, :-1], boxes[1:, 1:], boxes[:-1, 1:]])
         patterns, which = np.unique(around.reshape(4, -1), axis=1, return_inverse=True)
         wanted = np.array([_wanted(p, values, layers) for p in patterns.T.tolist()])[which].reshape(around.shape[1:])
         counts[first][1:-1] = np.maximum(counts[first][1:-1], wanted.max((1, 2), initial=0))

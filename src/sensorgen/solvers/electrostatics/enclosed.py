@@ -96,15 +96,15 @@ def _regions(cell: LayerCell, levels: Levels, order: Any) -> dict[int, Any]:
 def _far(cell: LayerCell, far_mm: float) -> list[bool]:
     """Mask of the layers that are far, and no plates."""
     low, high = cell.heights_mm[:-1], cell.heights_mm[1:]
-    holds = [np.array([k in own for own in cell.regions]) for k in range(cell.conductors)]
-    spans = {k: (low[own].min(), high[own].max()) for k, own in enumerate(holds) if own.any()}
-    area = cell.size_mm[0] * cell.size_mm[1]
-    far = []
-    for here, (bottom, top) in zip(cell.regions, zip(low, high, strict=True), strict=True):
-        metal = [k for k in here if k < cell.conductors]
-        plate = sum(shapely.area(here[k]) for k in metal) > (1 - _FULL) * area
-        apart = min((max(bottom - z1, z0 - top) for k, (z0, z1) in spans.items() if [k] != metal), default=np.inf)
-        far.append(len(metal) == 1 and not plate and apart > far_mm)
+    areas = np.array(
+        [[shapely.area(own[k]) if k in own else np.nan for own in cell.regions] for k in range(cell.conductors)]
+    )
+    holds = ~np.isnan(areas)  # conductors by layers
+    bottom = np.where(holds, low, np.inf).min(axis=1, keepdims=True)
+    top = np.where(holds, high, -np.inf).max(axis=1, keepdims=True)
+    apart = np.where(holds, np.inf, np.maximum(low - top, bottom - high)).min(axis=0)
+    plate = np.nansum(areas, axis=0) > (1 - _FULL) * cell.size_mm[0] * cell.size_mm[1]
+    far: list[bool] = ((holds.sum(axis=0) == 1) & ~plate & (apart > far_mm)).tolist()
     return far
 
 

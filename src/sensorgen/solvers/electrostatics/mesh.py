@@ -218,29 +218,55 @@ class Flow:
     count: int
 
 
+@dataclass(frozen=True)
+class _Rim:
+    """Boundary of a mesh whose every corner has one fan, counter-clockwise.
+
+    Attributes
+    ----------
+    around : dict of int to Fan
+        Triangles at each corner.
+    walls, top : list of edge
+        Mirrors, and the electrode at 1 V.
+    loops : dict of int to int
+        Of each point on it, the least of those that its edges join it to.
+    starts : set of int
+        Points where an edge on an electrode begins.
+    """
+
+    around: dict[int, Fan]
+    walls: list[Edge]
+    top: list[Edge]
+    loops: dict[int, int]
+    starts: set[int]
+
+    @classmethod
+    def of(cls, mesh: Triangles) -> "_Rim":
+        """Boundary of a mesh."""
+        around = {corner: found[0] for corner, found in fans(mesh.triangles).items()}
+        rim = [(corner, fan.spokes[0]) for corner, fan in around.items() if not fan.closed]
+        walls = [e for e in rim if _named(e) not in mesh.terminals]
+        top = [e for e in rim if mesh.terminals.get(_named(e)) == "top"]
+        starts = {a for a, b in rim if _named((a, b)) in mesh.terminals}
+        return cls(around, walls, top, _groups(rim), starts)
+
+
 def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
     """Mirrors, cuts and electrode of a mesh whose every corner has one fan; cuts keep away from cones."""
-    around = {corner: found[0] for corner, found in fans(mesh.triangles).items()}
-    rim = [(corner, fan.spokes[0]) for corner, fan in around.items() if not fan.closed]  # counter-clockwise
-    walls = [e for e in rim if _named(e) not in mesh.terminals]
-    loops, mirrors = _groups(rim), _groups(walls)
+    rim = _Rim.of(mesh)
+    mirrors, count = _groups(rim.walls), HELD
     unknown_of: dict[int, int] = {}
     lifts: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    starts = {a for a, b in rim if _named((a, b)) in mesh.terminals}
-    ends = starts - set(cones)  # a cut ends with an electrode to its left, lest it part a mirror's value
-    carrying = {loops[a] for a in starts}  # a hole whose rim is all mirror does not
-    count = HELD
-    for piece in _connected(around):
-        values, count = _on_mirrors(piece, mirrors, (piece & loops.keys()) - set(cones), count)
+    for piece in _connected(rim.around):
+        values, count = _on_mirrors(piece, mirrors, (piece & rim.loops.keys()) - set(cones), count)
         unknown_of |= values
-        start = loops[min(point for point, value in values.items() if value == 0)]
-        rims = {k: loops[k] for k in piece if k in loops}
-        for path in _cuts(around, rims, start, carrying & set(rims.values()) | {start}, ends, cones):
-            for number, corner in _beside(around, path):
+        start = rim.loops[min(point for point, value in values.items() if value == 0)]
+        for path in _cuts(rim, {k: rim.loops[k] for k in piece if k in rim.loops}, start, cones):
+            for number, corner in _beside(rim.around, path):
                 lifts[number].append((corner, count))
             count += 1
-    top = [e for e in rim if mesh.terminals.get(_named(e)) == "top"]
-    return Flow(unknown_of, {_named(e) for e in walls}, dict(lifts), top, _rise(top, lifts, around), count)
+    rise = _rise(rim.top, lifts, rim.around)
+    return Flow(unknown_of, {_named(e) for e in rim.walls}, dict(lifts), rim.top, rise, count)
 
 
 def _connected(around: Mapping[int, Fan]) -> list[set[int]]:
@@ -295,31 +321,34 @@ def _groups(edges: Iterable[Edge]) -> dict[int, int]:
     return least
 
 
-def _cuts(
-    around: dict[int, Fan], loops: dict[int, int], start: int, carrying: set[int], ends: set[int],
-    cones: Collection[int],
-) -> Iterator[list[int]]:  # fmt: skip
+def _cuts(rim: _Rim, loops: dict[int, int], start: int, cones: Collection[int]) -> Iterator[list[int]]:
     """For each loop that carries flux but the first, points from it to another one, all inside but for both ends."""
+    ends = rim.starts - set(cones)  # a cut ends with an electrode to its left, lest it part a mirror's value
+    carrying = set(loops.values()).intersection(map(rim.loops.get, rim.starts)) | {start}  # not where all is mirror
     reached, before = {start}, {k: k for k in _ends_of(start, loops, ends)}
     todo = deque(before)
     while todo and reached < carrying:
         here = todo.popleft()
-        fan = around[here]
-        for spoke in fan.spokes if fan.closed else fan.spokes[1:-1]:
+        for spoke in rim.around[here].inside:
             if spoke in before or spoke in cones:
                 continue
             if spoke not in loops:
                 before[spoke] = here
                 todo.append(spoke)
             elif loops[spoke] in carrying - reached:
-                path = [spoke, here]
-                while before[path[-1]] != path[-1]:
-                    path.append(before[path[-1]])
-                yield path
+                yield [spoke, *_back(before, here)]
                 reached.add(loops[spoke])
                 new = _ends_of(loops[spoke], loops, ends)
                 before |= {k: k for k in new}
                 todo += new
+
+
+def _back(before: Mapping[int, int], point: int) -> Iterator[int]:
+    """Points from one to the one that is its own predecessor."""
+    yield point
+    while before[point] != point:
+        point = before[point]
+        yield point
 
 
 def _ends_of(loop: int, loops: Mapping[int, int], ends: Collection[int]) -> list[int]:

@@ -219,10 +219,7 @@ def _solids(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> list[t
     import netgen.occ as occ
 
     box = occ.Box(cell.low_mm, cell.high_mm)
-    pieces: dict[int, list[Any]] = {}
-    for _, piece, kind in cell.boxes():
-        pieces.setdefault(kind, []).append(solid(piece) * box)
-    filled = {kind: occ.Fuse(own) if len(own) > 1 else own[0] for kind, own in pieces.items()}
+    filled = _filled(cell, box)
     rest = box
     for shape in filled.values():
         rest = rest - shape
@@ -243,6 +240,16 @@ def _solids(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> list[t
             part = shape * occ.Box(tuple(low), tuple(high)) if len(parts) > 1 else shape
             named.append((f"d{kind - cell.conductors}p{n}", part))
     return named
+
+
+def _filled(cell: RoundCell, box: Any) -> dict[int, Any]:
+    """Pieces of each conductor and dielectric as one solid, cut at the sides of the cell."""
+    import netgen.occ as occ
+
+    pieces: dict[int, list[Any]] = {}
+    for _, piece, kind in cell.boxes():
+        pieces.setdefault(kind, []).append(solid(piece) * box)
+    return {kind: occ.Fuse(own) if len(own) > 1 else own[0] for kind, own in pieces.items()}
 
 
 def solid(piece: Piece) -> Any:
@@ -311,13 +318,20 @@ class _Grading:
     def mark(self, faces: Sequence[Any]) -> None:
         """Mark those of some faces."""
         edges = [edge for face in faces for edge in face.edges if edge.mass > SAME_MM]  # poles have edges of no length
+        ways = self._mark_edges(edges)
+        corners = {_key(vertex.p): vertex for edge in edges for vertex in edge.vertices}
+        for place, vertex in corners.items():
+            if self._is_corner(place, ways.get(place, [])) and self._is_open(np.array(place)):
+                vertex.hpref = 1
+                self.any = True
+
+    def _mark_edges(self, edges: Sequence[Any]) -> dict[tuple[float, ...], list[Real]]:
+        """Mark those of some edges that are open; unit vectors along them from each of their ends."""
         ways: dict[tuple[float, ...], list[Real]] = {}
-        corners, seen = {}, set()
+        seen = set()
         for edge in edges:
             low, high = edge.parameter_interval
             middle = np.array(tuple(edge.Value((low + high) / 2)))
-            ends = {_key(vertex.p): vertex for vertex in edge.vertices}
-            corners.update(ends)
             if _key(middle) in seen:
                 continue
             seen.add(_key(middle))
@@ -325,12 +339,9 @@ class _Grading:
                 edge.hpref = 1
                 self.any = True
                 self.along += [tuple(edge.Value(t)) for t in np.linspace(low, high, 17)]
-                for end in ends:
+                for end in dict.fromkeys(_key(vertex.p) for vertex in edge.vertices):
                     ways.setdefault(end, []).append((middle - end) / np.linalg.norm(middle - end))
-        for place, vertex in corners.items():
-            if self._is_corner(place, ways.get(place, [])) and self._is_open(np.array(place)):
-                vertex.hpref = 1
-                self.any = True
+        return ways
 
     def _is_open(self, place: Real) -> bool:
         height = 1 - (2 * np.arange(_SPHERE) + 1) / _SPHERE

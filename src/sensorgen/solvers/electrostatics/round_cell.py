@@ -95,13 +95,11 @@ class RoundCell:
         longest_mm : float
             Beyond which no place is sized [mm].
         """
-        turn, boxes, sized = np.linspace(0, 2 * np.pi, 33)[:-1], self.boxes(), []
+        boxes, sized = self.boxes(), []
         for own, piece, kind in boxes:
             others = [box for box, _, its in boxes if its != kind and not _meet(box, own)]
             if isinstance(piece, Revolved):
-                r, z = np.concatenate([edge.places(16) for edge in profile(piece)]).T[:, :, None]
-                x, y = piece.x_mm + r * np.cos(turn), piece.y_mm + r * np.sin(turn)
-                places = np.stack([x, y, z + 0 * x], axis=-1).reshape(-1, 3)
+                places = _round_places(piece)
             else:
                 places = along[((along > own[:, 0] - SAME_MM) & (along < own[:, 1] + SAME_MM)).all(1)]
             places = places[self.holds(places)]
@@ -111,6 +109,14 @@ class RoundCell:
                 near = size < longest_mm
                 sized += [(x, y, z, h) for (x, y, z), h in zip(places[near].tolist(), size[near].tolist(), strict=True)]
         return sized
+
+
+def _round_places(piece: Revolved) -> Real:
+    """Places on the faces of a body of revolution (n, 3) [mm]."""
+    turn = np.linspace(0, 2 * np.pi, 33)[:-1]
+    r, z = np.concatenate([edge.places(16) for edge in profile(piece)]).T[:, :, None]
+    x, y = piece.x_mm + r * np.cos(turn), piece.y_mm + r * np.sin(turn)
+    return np.stack([x, y, z + 0 * x], axis=-1).reshape(-1, 3)
 
 
 class ProfileEdge(NamedTuple):

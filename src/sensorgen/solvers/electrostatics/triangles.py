@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Whole
+from sensorgen.scene.repetition import Band, SectionCell, Slice, cell
 from sensorgen.scene.sections import ROUNDING_MM, Section, distinct
-from sensorgen.scene.unit_cell import Band, SectionCell, Slice, cell
 
 Edge = tuple[int, int]
 Triangle = tuple[int, int, int]
@@ -51,15 +51,7 @@ def triangles(cell: SectionCell) -> Triangles:
         The electrodes touch, none lies opposite the other, or the field between them would leave the sensor.
     """
     points, filled = _all(cell)
-    top, bottom = (
-        {p for corners, (what, _) in filled if what == f"@{end}" for p in corners} for end in ("top", "bottom")
-    )
-    places = sorted((*points[p], p in top) for p in top | bottom)
-    for (x, z, end), (at, above, other) in pairwise(places):
-        if x == at and above - z < _CONTACT_MM and end != other:
-            raise ValueError("the electrodes touch: the capacitance grows without bound")
-    if top & bottom:
-        raise ValueError("the electrodes touch: the capacitance grows without bound")
+    _refuse_contact(points, filled)
     mesh, owners, inside = _triangulated(points, filled)
     _refuse_open(points, owners, inside, cell)
     return mesh
@@ -218,6 +210,14 @@ def _piece(filled: _Filled, beside: dict[int, list[int]], left: set[int]) -> tup
     return piece, ends
 
 
+def _refuse_contact(points: NDArray[np.float64], filled: _Filled) -> None:
+    """Refuse electrodes that share a point, or are next to each other on one line of points."""
+    places = {(*points[p].tolist(), what) for corners, (what, _) in filled if what.startswith("@") for p in corners}
+    for (x, z, end), (at, above, other) in pairwise(sorted(places)):
+        if x == at and above - z < _CONTACT_MM and end != other:
+            raise ValueError("the electrodes touch: the capacitance grows without bound")
+
+
 def _refuse_open(
     points: NDArray[np.float64], owners: dict[Edge, list[int]], inside: set[int], cell: SectionCell
 ) -> None:
@@ -250,19 +250,18 @@ def flipped(points: NDArray[np.float64], triangles: Sequence[Triangle], regions:
     corners_of = list(triangles)
     owner = {edge: n for n, corners in enumerate(corners_of) for edge in _turns(corners)}
     todo = [edge for edge in owner if edge[0] < edge[1]]
-    places: list[tuple[float, float]] = [(float(x), float(y)) for x, y in points]
+    places = points.tolist()
     while todo:
         a, b = todo.pop()
-        one, other = owner.get((a, b)), owner.get((b, a))
-        if one is None or other is None or regions[one] != regions[other]:
+        one, other = owner.get((a, b), -1), owner.get((b, a), -1)
+        if min(one, other) < 0 or regions[one] != regions[other]:
             continue
         c, d = _third(corners_of[one], a, b), _third(corners_of[other], a, b)
         if not _is_better(*(places[k] for k in (a, b, c, d))):
             continue
         del owner[a, b], owner[b, a]
         corners_of[one], corners_of[other] = (a, d, c), (d, b, c)
-        for n in (one, other):
-            owner.update(dict.fromkeys(_turns(corners_of[n]), n))
+        owner |= dict.fromkeys(_turns((a, d, c)), one) | dict.fromkeys(_turns((d, b, c)), other)
         todo += [(a, d), (d, b), (b, c), (c, a)]
     return corners_of
 
@@ -317,6 +316,11 @@ class Fan:
     def closed(self) -> bool:
         """True if it goes all around the corner."""
         return len(self.members) == len(self.spokes)
+
+    @property
+    def inside(self) -> list[int]:
+        """Other ends of the edges between two of its triangles."""
+        return self.spokes if self.closed else self.spokes[1:-1]
 
 
 def fans(triangles: Sequence[Triangle]) -> dict[int, list[Fan]]:

@@ -280,23 +280,33 @@ def _check(inputs: Inputs) -> None:
 
     Extremes of each quantity decide for a million samples, where they can.
     """
-    left, patch, length, force = (inputs[name] for name in ("left_m", "tip_m", "length_m", "force_n"))
+    _check_patch(inputs)
+    _check_strain(inputs)
+    for name in ("top_piezoresistance_per_n", "bottom_piezoresistance_per_n"):
+        if inputs[name].any() and (rise := inputs[name] * inputs["force_n"]).min(initial=0.0) < -1:
+            raise OutOfRange(f"{name} times force_n is {rise.min():.3g}: below -1 resistivity is negative")
+
+
+def _check_patch(inputs: Inputs) -> None:
+    """Refuse a patch beyond the sensor."""
+    left, patch, length = (inputs[name] for name in ("left_m", "tip_m", "length_m"))
     if _highest(left) + _highest(patch) > _lowest(length):
         end = left + patch
         bad = np.asarray(end > length * (1 + ROUNDING))
         if bad.any():
             far, size = (float(np.broadcast_to(v, bad.shape)[bad].flat[0]) for v in (end, length))
             raise OutOfRange(f"the pressed patch ends at {far:g} m, beyond the sensor's {size:g} m")
-    touches_at = _lowest(inputs["width_m"]) * _lowest(patch) * _lowest(inputs["modulus_pa"])
-    if not (touches_at > 0 and _highest(force) < touches_at * (1 - ROUNDING)):
+
+
+def _check_strain(inputs: Inputs) -> None:
+    """Refuse electrodes that touch, and a force without an area."""
+    touches_at = _lowest(inputs["width_m"]) * _lowest(inputs["tip_m"]) * _lowest(inputs["modulus_pa"])
+    if not (touches_at > 0 and _highest(inputs["force_n"]) < touches_at * (1 - ROUNDING)):
         strain = inputs.strain()
         if np.isinf(strain).any():
             raise OutOfRange("a force presses on a patch without area: tip_m has to be above 0 where force_n is not 0")
         if (strain >= 1).any():
             raise OutOfRange(f"the force strains the film by {strain.max():.3g}: at 1 its electrodes touch (Eq. B.49)")
-    for name in ("top_piezoresistance_per_n", "bottom_piezoresistance_per_n"):
-        if inputs[name].any() and (rise := inputs[name] * force).min(initial=0.0) < -1:
-            raise OutOfRange(f"{name} times force_n is {rise.min():.3g}: below -1 resistivity is negative")
 
 
 def in_blocks(

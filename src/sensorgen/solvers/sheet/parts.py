@@ -265,19 +265,14 @@ def _corners(sheet: Sheet, contact: Contact) -> tuple[list[float], list[float]]:
     Inside the sheet every corner is one. On an edge of the sheet the potential is smooth where the contact stands
     upright on it, and not where it lies along it.
     """
-    x = [at for at in contact.x_m if _inside(at, sheet.length_m)]
-    y = [at for at in contact.y_m if _inside(at, sheet.width_m)]
-    if x and y:
-        return x, y
-    if contact.y_m[0] == contact.y_m[1] and x:
-        return x, [contact.y_m[0]]
-    if contact.x_m[0] == contact.x_m[1] and y:
-        return [contact.x_m[0]], y
-    return [], []
+    x, y = _ends(contact.x_m, sheet.length_m), _ends(contact.y_m, sheet.width_m)
+    return (x, y) if x and y else ([], [])
 
 
-def _inside(at: float, size: float) -> bool:
-    return ROUNDING * size < at < (1 - ROUNDING) * size
+def _ends(span: tuple[float, float], size: float) -> list[float]:
+    """Ends of a span that are inside a size; of a span that is a single place, this place."""
+    inside = [at for at in span if ROUNDING * size < at < (1 - ROUNDING) * size]
+    return inside or ([span[0]] if span[0] == span[1] else [])
 
 
 def _lines(size: float, borders: list[float], corners: set[float], cells: int) -> Real:

@@ -4,15 +4,17 @@ Times are the processor's, imports left out, so that a busy machine shows nearly
 """
 
 from collections.abc import Callable, Sequence
-from types import ModuleType
 
 from sensorgen import models
 from sensorgen.core import lazy as registry
-from sensorgen.verification.chart import blocks, cells, lines, membrane, networks, presses, readback, rounds, whole
-from sensorgen.verification.chart.measured import ChartPoint, SilentModel, with_front
+from sensorgen.verification.chart import cells, elastic, lines, networks, presses, whole
+from sensorgen.verification.chart.measured import ChartPoint, SceneKind, SilentModel, with_front
 
-KINDS = (cells, presses, blocks, membrane, rounds, lines, readback, networks, whole)
-SCENES = tuple(name for kind in KINDS for name in kind.STANDARD)
+KINDS = (
+    cells.KIND, presses.KIND, elastic.BLOCK, elastic.MEMBRANE, elastic.ROUND, lines.LINE, lines.INVERSION,
+    networks.KIND, whole.KIND,
+)  # fmt: skip
+SCENES = tuple(name for kind in KINDS for name in kind.scenes)
 
 
 def points(scenes: Sequence[str], budget_s: float, started: Callable[[str], None]) -> list[ChartPoint]:
@@ -47,7 +49,7 @@ def silent(scenes: Sequence[str], answers: Sequence[ChartPoint]) -> list[SilentM
     spoke = {(p.scene, p.model.partition(":")[0]) for p in answers}
     refused = {scene: kind_of(scene).why_not_applicable(scene) for scene in scenes}
     return [
-        SilentModel(scene, name, refused[scene].get(name) or _unasked(name, kind_of(scene).ASKED))
+        SilentModel(scene, name, refused[scene].get(name) or _unasked(name, kind_of(scene).asked))
         for scene in scenes for name in models.names() if (scene, name) not in spoke
     ]  # fmt: skip
 
@@ -57,6 +59,6 @@ def _unasked(name: str, asked: str) -> str:
     return f"{(registry.load(models, name).__doc__ or '').strip().partition(chr(10))[0]} Not {asked}."
 
 
-def kind_of(scene: str) -> ModuleType:
-    """The module that measures a scene."""
-    return next(kind for kind in KINDS if scene in kind.STANDARD)
+def kind_of(scene: str) -> SceneKind:
+    """Kind of a scene, which measures it."""
+    return next(kind for kind in KINDS if scene in kind.scenes)

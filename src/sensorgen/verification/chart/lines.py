@@ -1,21 +1,25 @@
-"""Models of the pressed line on a plate whose impedance is known to 17 digits.
+"""Models of the pressed line on a plate whose impedance is known to 17 digits, and the inversion of such an impedance.
 
 One press is that of a round tip (Hertz's ellipse of pressure); what models of a flat tip are off is what it counts.
 The error is the larger one of abs(Z) and of Re Z by itself, at the worst frequency: Re Z, which holds the position, is
-a thousandth of abs(Z) at low tones, and is lost first.
+a thousandth of abs(Z) at low tones, and is lost first. That of the inversion is the larger one of force, as a share of
+it, and position, as a share of the sensor's length.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.models import compression
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.inverse.estimator import Estimator
 from sensorgen.solvers.line.inputs import PressedLine
 from sensorgen.verification import line_models, peers
-from sensorgen.verification.chart.measured import DIGITS, ChartPoint, Level, climbed
-
-ASKED = "the impedance of a pressed line"
+from sensorgen.verification.chart.measured import DIGITS, ChartPoint, Level, SceneKind, climbed
 
 # The plate of Table 3.1, pressed in its middle.
 PLATE = {
@@ -87,15 +91,7 @@ _PIECES = (1, 4, 16, 64, 256)  # of a tip
 
 
 def points(name: str, budget_s: float) -> list[ChartPoint]:
-    """Measure every model of the line.
-
-    Parameters
-    ----------
-    name : str
-        Of ``STANDARD``.
-    budget_s : float
-        A ladder gets no more cells where that would take longer, estimated as ten times the last one [s].
-    """
+    """Measure every model of the line."""
     standard = STANDARD[name]
     known = np.array(list(standard.known.values()))
 
@@ -122,3 +118,46 @@ def why_not_applicable(name: str) -> dict[str, str]:
     if STANDARD[name].profile == "uniform":
         return {"pressure": "a flat tip presses evenly"}
     return {"pressure": "it cuts the tip into the pieces of line_tip"}
+
+
+_LINE = STANDARD["line, seven tones"]
+_TONES = np.array(list(_LINE.known))
+_READING = np.array(list(_LINE.known.values()))
+_LENGTH_M, _TIP_M = PLATE["length_m"], PLATE["tip_m"]
+
+_LOADS = {"inversion of a load": (_LINE.force_n, PLATE["left_m"] + _TIP_M / 2)}  # [N], centre [m]
+
+Press = tuple[float, float]
+
+
+def _inversions(name: str, budget_s: float) -> list[ChartPoint]:
+    """Measure the inversion; what is prepared once for a sensor is not in its time."""
+    force, position = _LOADS[name]
+
+    def judge(press: Press) -> tuple[float, str]:
+        off = abs(press[0] / force - 1), abs(press[1] - position) / _LENGTH_M
+        return max(*off, DIGITS), f"{press[0]:.6g} N at {1e3 * press[1]:.6g} mm"
+
+    def sought() -> Press:
+        inverted = _estimator().one(_READING)
+        return inverted.force_n, inverted.position_m
+
+    return list(climbed(name, [("invert: seven tones", [("", sought)])], judge, budget_s))
+
+
+def _only_inversion(_: str) -> dict[str, str]:
+    """No reasons: models of the line are not asked, only what turns around is."""
+    return {}
+
+
+@cache
+def _estimator() -> Estimator:
+    p = PLATE
+    film = EPS0_F_PER_M * p["eps_r"] * p["width_m"] / p["film_m"]
+    high, rho = ((p[f"top_{of}"], p[f"bottom_{of}"]) for of in ("thickness_m", "resistivity_ohm_m"))
+    law = compression.unconfined(p["modulus_pa"])
+    return Estimator(Sensor(_LENGTH_M, p["width_m"], high, rho, film, law, _TIP_M), _TONES)
+
+
+LINE = SceneKind("the impedance of a pressed line", STANDARD, points, why_not_applicable)
+INVERSION = SceneKind("force and position from an impedance", _LOADS, _inversions, _only_inversion)

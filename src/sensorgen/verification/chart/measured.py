@@ -1,7 +1,7 @@
 """Answers of models with their times; those that no other beats; models without an answer."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -67,6 +67,29 @@ class SilentModel:
     scene: str
     model: str
     why: str
+
+
+@dataclass(frozen=True)
+class SceneKind:
+    """Standard scenes with the same question.
+
+    Attributes
+    ----------
+    asked : str
+        The question.
+    scenes : collection of str
+        Names.
+    points : callable
+        Measures every model on one of them. A finer level is not tried where that would take longer than a budget [s],
+        estimated as ten times the last one.
+    why_not_applicable : callable
+        Why models do not apply to one of them, by model.
+    """
+
+    asked: str
+    scenes: Collection[str]
+    points: Callable[[str, float], list[ChartPoint]]
+    why_not_applicable: Callable[[str], dict[str, str]]
 
 
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:

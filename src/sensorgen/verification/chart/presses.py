@@ -18,11 +18,10 @@ from sensorgen.models import compression, fem2d, press2d, press3d, springs, thes
 from sensorgen.models.press2d import Elastic, Fineness
 from sensorgen.scene.scene import Fill, Scene
 from sensorgen.solvers.contact import mesher
-from sensorgen.verification.chart.measured import ChartPoint, Ladder, Level, climbed, relative
+from sensorgen.verification.chart.measured import ChartPoint, Ladder, Level, SceneKind, climbed, relative
 
 _EPS = {"x60": 4.68, "air": 1.00059}
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
-ASKED = "compression of a cell"
 _WIDTH_M = 10e-3  # of the sensor, for a film that is bonded
 
 _MISSING = "the mesher is not installed (extra fem), or the load was not reached"
@@ -81,15 +80,7 @@ STANDARD = {f"tri pressed, {film}: {what}": (film, what) for what in (_DOWN, _RI
 
 
 def points(name: str, budget_s: float) -> list[ChartPoint]:
-    """Measure every model of compression on one cell.
-
-    Parameters
-    ----------
-    name : str
-        Of ``STANDARD``.
-    budget_s : float
-        A finer mesh is not tried where that would take longer, estimated as ten times the last one [s].
-    """
+    """Measure every model of compression on one cell."""
     film, what = STANDARD[name]
     known = CELLS[film]
     expected = known.down_um if what == _DOWN else known.rise_pf_per_m
@@ -181,3 +172,6 @@ def _swept(known: KnownCell, work: Callable[[tri.Params], float]) -> Real:
 def _field_f_per_m2(p: tri.Params) -> float:
     scene = tri.scene(tri.Params(**{**vars(p), "length_mm": p.period_mm, "width_mm": 1.0}), Fill())
     return fem2d.capacitance(scene, _EPS, 1e-4).middle() / (p.period_mm * M_PER_MM**2)
+
+
+KIND = SceneKind("compression of a cell", STANDARD, points, why_not_applicable)

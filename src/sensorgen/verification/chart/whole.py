@@ -13,27 +13,18 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.query import Query
 from sensorgen.verification.apart import ModelAnswer
 from sensorgen.verification.chart import cells, presses
-from sensorgen.verification.chart.measured import ChartPoint, Ladder, climbed
+from sensorgen.verification.chart.measured import ChartPoint, Ladder, SceneKind, climbed
 from sensorgen.verification.design_chart import works
 from sensorgen.verification.design_chart.questions import DIGITS, Reference, of_modulus
 from sensorgen.verification.design_chart.results import composed
 
-ASKED = "abs(Z) of a sensor under a load"
 _FORCE_N = 5.0  # 50 kPa
 _FILM = "0.1 mm"
 STANDARD = {f"prediction of tri, {_FILM}": f"tri, {_FILM}"}
 
 
 def points(name: str, budget_s: float) -> list[ChartPoint]:
-    """Measure predictions from rough to accurate, nothing stored.
-
-    Parameters
-    ----------
-    name : str
-        Of ``STANDARD``.
-    budget_s : float
-        A finer one is not tried where that would take longer, estimated as ten times the last one [s].
-    """
+    """Measure predictions from rough to accurate, nothing stored."""
     design = designs.make({"shape": "tri", "parameters": {"dielectric_mm": float(_FILM.removesuffix(" mm"))}})
     body, query = bodies.drawn(design), Query(force_n=_FORCE_N)
     cell, known = cells.STANDARD[STANDARD[name]](), presses.CELLS[_FILM]
@@ -80,3 +71,6 @@ def nothing_stored() -> Iterator[None]:
 def why_not_applicable(name: str) -> dict[str, str]:  # noqa: ARG001
     """Why single models do not apply to a scene: a prediction chooses among them."""
     return {}
+
+
+KIND = SceneKind("abs(Z) of a sensor under a load", STANDARD, points, why_not_applicable)

@@ -13,11 +13,12 @@ from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.values import film, permittivities
 from sensorgen.models import CapacitanceModel, capacitance_models, thesis_cells
-from sensorgen.models.press2d import BoundaryConditions
+from sensorgen.models.press2d import BoundaryConditions, Elastic
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import mesh_ladder, sensor_model
-from sensorgen.prediction.capacitance import expected, is_plate
+from sensorgen.prediction.capacitance import Answer, expected, is_plate
 from sensorgen.prediction.compression_law import CLOSED_FORM, elastic, law_of
+from sensorgen.prediction.mesh_ladder import PressedPiece
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import piece
@@ -38,7 +39,7 @@ Level = tuple[str, Work, float]
 
 @dataclass(frozen=True)
 class Series:
-    """A model, or another program, with its levels from coarse to fine.
+    """A model, or another program, with its levels from coarse to fine; or why it does not apply.
 
     Attributes
     ----------
@@ -46,11 +47,14 @@ class Series:
         Name, and the program that it is of.
     levels : tuple of (str, callable, float)
         Words; work that gives an answer, of a module; expected time, 0 where unknown [s].
+    why_not : str
+        Why it has no levels.
     """
 
     model: str
     program: str
     levels: tuple[Level, ...]
+    why_not: str = ""
 
 
 @dataclass(frozen=True)
@@ -82,9 +86,7 @@ class Question:
     key, title, asked : str
         Name, title of its panel, and the quantity in words.
     series : tuple of Series
-        Who is asked.
-    silent : tuple of (str, str)
-        Who is not, and why.
+        Models and programs.
     references : tuple of Reference
         Those that are known before anything runs.
     measure : callable
@@ -95,7 +97,6 @@ class Question:
     title: str
     asked: str
     series: tuple[Series, ...]
-    silent: tuple[tuple[str, str], ...]
     references: tuple[Reference, ...]
     measure: Callable[[tuple[complex, ...], tuple[complex, ...]], float]
 
@@ -119,24 +120,20 @@ def questions(body: Body, query: Query) -> list[Question]:
 def _capacitance(body: Body) -> Question:
     scene, count = body.cells.first(), body.cells.count or 1.0  # 0 where every cell has a rim
     eps = {v.material: v.value for v in permittivities(body.design)}
-    series, silent = [], []
+    series = []
     for name, module in capacitance_models().items():
-        if why := module.why_not_applicable(scene):
-            silent.append((name, why))
-        else:
-            series.append(Series(name, OWN, tuple(_bounds(name, module, scene, eps, count))))
+        why = module.why_not_applicable(scene) or ""
+        levels = () if why else tuple(_bounds(name, module, scene, eps, count))
+        series.append(Series(name, OWN, levels, why))
     series += _formulas(body.design, eps)
     for name in peers.FIELD:
         runs, why = peers.applicable(name, scene, eps)
-        if why:
-            silent.append((name, why))
-            continue
         levels = tuple(
             (level.rstrip(", "), partial(works.peer, name, scene, eps, k, count), 0.0)
             for k, (level, _) in enumerate(runs)
         )
-        series.append(Series(name, name, levels))
-    return Question("capacitance", "capacitance at rest", "C at rest", tuple(series), tuple(silent), (), largest)
+        series.append(Series(name, name, levels, why))
+    return Question("capacitance", "capacitance at rest", "C at rest", tuple(series), (), largest)
 
 
 def _bounds(
@@ -159,48 +156,61 @@ def _formulas(design: Design, permittivity: Mapping[str, float]) -> Iterator[Ser
 
 
 def _compression(body: Body, stress_pa: float) -> Question:
-    rest, pressed = rest_state(body, inf), piece(body)
-    plate = is_plate(rest.answer, pressed.scene)
-    series, silent = [], [("springs", "it has a displacement and no capacitance")]
+    rest, pressed = rest_state(body, inf).answer, piece(body)
+    plate = is_plate(rest, pressed.scene)
+    meshes = list(_meshes(body, pressed, stress_pa, plate=plate))
+    series = (
+        Series("springs", OWN, (), "it has a displacement and no capacitance"),
+        *_laws(body, rest, pressed, stress_pa, plate=plate), *meshes,
+    )  # fmt: skip
+    references: tuple[Reference, ...] = ()
+    if plate:
+        ends = [works.rise_by_law(body, law, stress_pa).value[0].real for law in ("unconfined", "bonded")]
+        middle = (ends[0] + ends[1]) / 2
+        references = (Reference("between a free and a bonded plate", "laws", (middle,), abs(ends[0] / middle - 1)),)
+    elif any(each.levels for each in meshes):
+        references = _published(body, elastic(body.design, pressed.scene), stress_pa)
+    asked = f"rise of C at {stress_pa / 1e3:.4g} kPa"
+    return Question("compression", asked, asked, series, references, largest)
+
+
+def _laws(body: Body, rest: Answer, pressed: PressedPiece, stress_pa: float, *, plate: bool) -> Iterator[Series]:
+    """Laws that solve no field, and the stored curve of a cell that is no plate."""
     for law in (*CLOSED_FORM, ""):
         try:
-            law_here = law_of(body.design, rest.answer, law, printed=None if body.is_drawn else pressed)
+            law_here = law_of(body.design, rest, law, printed=None if body.is_drawn else pressed)
         except SensorgenError as error:
-            silent.append((f"compression: {law}", str(error)))
-            continue
-        if law or not (plate or not law_here.bounded):
-            name = f"compression: {law or 'stored curve'}"
-            series.append(Series(name, OWN, (("", partial(works.rise_by_law, body, law, stress_pa), 0.0),)))
-    references: tuple[Reference, ...] = ()
+            yield Series(f"compression: {law}", OWN, (), str(error))
+        else:
+            if law or not (plate or not law_here.bounded):
+                work = partial(works.rise_by_law, body, law, stress_pa)
+                yield Series(f"compression: {law or 'stored curve'}", OWN, (("", work, 0.0),))
+
+
+def _meshes(body: Body, pressed: PressedPiece, stress_pa: float, *, plate: bool) -> Iterator[Series]:
+    """Finite elements."""
+    eps = {v.material: v.value for v in permittivities(body.design)}
     for name in mesh_ladder.MODELS:
         why = mesh_ladder.why_not_applicable(pressed, name)
         if why or plate:
-            silent.append((name, why or "a solid plate lies between its two laws, free and bonded"))
+            yield Series(name, OWN, (), why or "a solid plate lies between its two laws, free and bonded")
             continue
-        eps = {v.material: v.value for v in permittivities(body.design)}
         case = mesh_ladder.Case(pressed, name, elastic(body.design, pressed.scene), eps, BoundaryConditions())
         levels = tuple(
             (mesh.name.removeprefix(name).strip(", ") or "usual mesh",
              partial(works.rise_by_mesh, case, mesh.level, stress_pa, mesh.rise_error), mesh.seconds)
             for mesh in mesh_ladder.mesh_levels(pressed, name, 2)
         )  # fmt: skip
-        series.append(Series(name, OWN, levels))
-        references = _published(body, case, stress_pa)
-    if plate:
-        ends = [works.rise_by_law(body, law, stress_pa).value[0].real for law in ("unconfined", "bonded")]
-        middle = (ends[0] + ends[1]) / 2
-        references = (Reference("between a free and a bonded plate", "laws", (middle,), abs(ends[0] / middle - 1)),)
-    asked = f"rise of C at {stress_pa / 1e3:.4g} kPa"
-    return Question("compression", asked, asked, tuple(series), tuple(silent), references, largest)
+        yield Series(name, OWN, levels)
 
 
-def _published(body: Body, case: mesh_ladder.Case, stress_pa: float) -> tuple[Reference, ...]:
+def _published(body: Body, solids: Mapping[str, Elastic], stress_pa: float) -> tuple[Reference, ...]:
     """Published answers of two other programs for this very cell under this pressure, if there are any."""
     from sensorgen.verification.chart import presses
 
     soft = all(
         name in presses.SOLIDS and np.isclose(solid.youngs_modulus_pa, presses.SOLIDS[name].youngs_modulus_pa)
-        for name, solid in case.solids.items()
+        for name, solid in solids.items()
     )
     for known in presses.CELLS.values() if soft and body.is_drawn and body.design.shape == "tri" else ():
         at = np.flatnonzero(np.isclose(np.array(known.stress_kpa) * 1e3, stress_pa))
@@ -243,22 +253,22 @@ def exact(line: PressedLine) -> tuple[complex, ...]:
 
 def _line(sensor: Sensor, query: Query, body: Body) -> Question:
     line = pressed_line(sensor, query, query.load(body.design).position_m)
-    lossy = sensor.tan_delta or sensor.leak_s_per_m
-    silent = [("pressure", "a flat tip presses evenly")]
-    unable = {name: why for name in line_models.PROGRAMS if (why := peers.missing(name))}
-    if lossy or any(sensor.piezoresistance_per_pa):
-        unable["sheet"] = "the film loses, or the tracks are piezoresistive"
-    if lossy:
-        unable.setdefault("ngspice", "the film loses: its ladder has capacitors alone")
-    series = []
+    series = [Series("pressure", OWN, (), "a flat tip presses evenly")]
     for name, levels in line_models.LEVELS.items():
-        if name in unable:
-            silent.append((name, unable[name]))
-            continue
+        why = _why_no_line(name, sensor)
         runs = tuple((line_models.words(how), partial(works.line, name, line, how), 0.0) for how in levels)
-        series.append(Series(name, name if name in line_models.PROGRAMS else OWN, runs))
+        series.append(Series(name, name if name in line_models.PROGRAMS else OWN, () if why else runs, why))
     known = (Reference("chain matrices in 220 digits", "decimal numbers", exact(line), DIGITS),)
-    return Question("line", "pressed line", "Z of the line, |Z| and Re Z", tuple(series), tuple(silent), known, of_line)
+    return Question("line", "pressed line", "Z of the line, |Z| and Re Z", tuple(series), known, of_line)
+
+
+def _why_no_line(model: str, sensor: Sensor) -> str:
+    """Why a model of lines does not apply to a sensor, or ""."""
+    lossy = sensor.tan_delta or sensor.leak_s_per_m
+    if model == "sheet" and (lossy or any(sensor.piezoresistance_per_pa)):
+        return "the film loses, or the tracks are piezoresistive"
+    why = peers.missing(model) if model in line_models.PROGRAMS else ""
+    return why or ("the film loses: its ladder has capacitors alone" if model == "ngspice" and lossy else "")
 
 
 def _prediction(body: Body, query: Query) -> Question:
@@ -268,7 +278,7 @@ def _prediction(body: Body, query: Query) -> Question:
     for name, levels in (("plate, free", [("", free)]), ("default", [("", query)]), ("accuracy", fine)):
         runs = [(level, partial(works.predicted, body, asked), _seconds(body, asked)) for level, asked in levels]
         series.append(Series(f"predict: {name}", OWN, tuple(runs)))
-    return Question("prediction", "whole prediction", "|Z| under the load", tuple(series), (), (), of_modulus)
+    return Question("prediction", "whole prediction", "|Z| under the load", tuple(series), (), of_modulus)
 
 
 def _seconds(body: Body, query: Query) -> float:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import groupby
 from typing import Annotated
 
 from sensorgen.core.display import Displayed
@@ -13,7 +14,7 @@ from sensorgen.models.compression import Plate
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.sensor_model import rough_sensor
 from sensorgen.verification import peers
-from sensorgen.verification.apart import Runner, TimedAnswer, apart
+from sensorgen.verification.apart import ModelAnswer, Runner, TimedAnswer, apart
 from sensorgen.verification.design_chart.questions import (
     DIGITS,
     OWN,
@@ -29,7 +30,15 @@ from sensorgen.verification.design_chart.questions import (
 KEYS = ("capacitance", "compression", "line", "prediction")
 _LEAST = 2  # levels of another program, whose difference is its doubt: without it there is no reference
 _DEARER = 5.0  # how many times longer the next level should take than the last one
-Run = tuple[Series, str, TimedAnswer]  # a model, its level in words, and the answer
+
+
+@dataclass(frozen=True)
+class Run:
+    """A model or another program at a level, in words, and its answer."""
+
+    series: Series
+    level: str
+    timed: TimedAnswer
 
 
 @dataclass(frozen=True)
@@ -130,7 +139,8 @@ class DesignChart(Displayed):
     def parts(self, key: str) -> Iterator[Part]:
         """The table of one question."""
         here = [p for p in self.points if p.question == key]
-        yield Table.of(key, f"{self.titles[key]}: relative error; time of the processor", here)
+        if here:
+            yield Table.of(key, f"{self.titles[key]}: relative error; time of the processor", here)
         yield from _against(here)
         yield from (f"error larger than stated: {p.words()}" for p in here if p.contradicted)
         if silent := [(s.model, s.why) for s in self.silent if s.question == key]:
@@ -142,10 +152,11 @@ class DesignChart(Displayed):
         return [f"{p.words()}: error {p.error:.2g}, {p.stated:.2g} stated" for p in wrong]
 
     def csv(self) -> Iterator[str]:
-        """All points in one table."""
+        """All points in one table; nothing without any."""
         from sensorgen.core.document import comma_separated
 
-        yield comma_separated(Table.of("chart", "", self.points))
+        if self.points:
+            yield comma_separated(Table.of("chart", "", self.points))
 
 
 def _against(points: Sequence[Point]) -> Iterator[str]:
@@ -183,33 +194,35 @@ def chart(
         Nothing can be predicted of the body.
     """
     needed = {*keys, *(KEYS[:2] if "prediction" in keys else ())}
-    asked = [q for q in questions(body, query) if q.key in needed]
+    titles: dict[str, str] = {}
     points: list[Point] = []
     silent: list[Silent] = []
     best: dict[str, list[Reference]] = {}
-    for question in asked:
+    for question in questions(body, query):
+        if question.key not in needed:
+            continue
         runs, without = _runs(question, budget_s, step, runner)
         more = composed(body, query, best) if question.key == "prediction" else _from(runs)
         known = best[question.key] = [*question.references, *more]
-        if known:
-            points += [_point(question, *run, known) for run in runs]
-        else:
-            why = f"no reference within --budget {budget_s:g}"
-            without += [(model, why) for model in dict.fromkeys(series.model for series, *_ in runs)]
-        silent += [Silent(question.key, *each) for each in without]
+        if question.key in keys:
+            titles[question.key] = question.title
+            if known:
+                points += [_point(question, run, known) for run in runs]
+            else:
+                why = f"no reference within --budget {budget_s:g}"
+                without += dict.fromkeys((run.series.model for run in runs), why).items()
+            silent += [Silent(question.key, *each) for each in without]
     load = query.load(body.design)
     return DesignChart(
-        body.design.name, body.provenance, load.force_n, load.position_m,
-        {q.key: q.title for q in asked if q.key in keys}, tuple(p for p in points if p.question in keys),
-        tuple(s for s in silent if s.question in keys),
-    )  # fmt: skip
+        body.design.name, body.provenance, load.force_n, load.position_m, titles, tuple(points), tuple(silent)
+    )
 
 
 def _runs(
     question: Question, budget_s: float, step: Callable[[str], None], runner: Runner
 ) -> tuple[list[Run], list[tuple[str, str]]]:  # fmt: skip
     """Runs of all models for a question; and why a model has none, or no more."""
-    runs, silent = list[Run](), list(question.silent)
+    runs, silent = list[Run](), [(series.model, series.why_not) for series in question.series if series.why_not]
     for series in question.series:
         more, why = _climbed(series, budget_s, partial(step, f"{question.key}: {series.model}"), runner)
         runs += more
@@ -221,7 +234,7 @@ def _climbed(series: Series, budget_s: float, step: Callable[[], None], runner: 
     """Runs of a model from coarse to fine until the next one would take too long; and why there are no more."""
     done: list[Run] = []
     for level, work, expected_s in series.levels:
-        last_s = max((run.cold.cpu_s - _started_s(done) for _, _, run in done[-1:]), default=0.0)
+        last_s = max((run.timed.cold.cpu_s - _started_s(done) for run in done[-1:]), default=0.0)
         likely_s = max(expected_s, _DEARER * last_s if not expected_s else 0.0)
         if likely_s > budget_s and (
             series.program == OWN or len(done) >= _LEAST or series.model in peers.SLOW_TO_CONVERGE
@@ -229,7 +242,7 @@ def _climbed(series: Series, budget_s: float, step: Callable[[], None], runner: 
             return done, f"{level}: some {likely_s:.2g} s, more than --budget {budget_s:g}".removeprefix(": ")
         step()
         try:
-            done.append((series, level, runner(work)))
+            done.append(Run(series, level, runner(work)))
         except SensorgenError as error:
             return done, f"{level}: {error}".removeprefix(": ")
     return done, ""
@@ -237,24 +250,25 @@ def _climbed(series: Series, budget_s: float, step: Callable[[], None], runner: 
 
 def _started_s(done: Sequence[Run]) -> float:
     """Start of a process and loading of libraries, at most: the least difference of cold and warm [s]."""
-    return min((run.cold.cpu_s - run.warm.cpu_s for _, _, run in done), default=0.0)
+    return min((run.timed.cold.cpu_s - run.timed.warm.cpu_s for run in done), default=0.0)
 
 
 def _from(runs: Sequence[Run]) -> Iterator[Reference]:
-    """References: bounds, and the finest answer of a program with its last change as its doubt."""
-    bounds = [(run.answer.stated or 0.0, series, run) for series, _, run in runs if run.answer.certified]
+    """References: the narrowest bounds, and the finest answer of each program with its last change as its doubt."""
+    bounds = [(run.timed.answer.stated or 0.0, run) for run in runs if run.timed.answer.certified]
     if bounds:
-        width, series, run = min(bounds, key=lambda each: each[0])
-        yield Reference(f"the bounds of {series.model}", OWN, run.answer.value, max(width, DIGITS))
-    for series in dict.fromkeys(series for series, _, _ in runs):
-        levels = [run.answer for of, _, run in runs if of is series]
-        stated = levels[-1].stated
-        if levels[-1].certified or series.model in peers.SLOW_TO_CONVERGE or (len(levels) < 2 and stated is None):
-            continue
-        change = max((abs(levels[-1].value[0] / before.value[0] - 1) for before in levels[-2:-1]), default=0.0)
-        yield Reference(
-            f"the finest {series.model}", series.program, levels[-1].value, max(change, stated or 0.0, DIGITS)
-        )
+        width, run = min(bounds, key=lambda each: each[0])
+        yield Reference(f"the bounds of {run.series.model}", OWN, run.timed.answer.value, max(width, DIGITS))
+    for series, levels in groupby(runs, key=lambda run: run.series):
+        yield from _finest(series, [run.timed.answer for run in levels])
+
+
+def _finest(series: Series, levels: Sequence[ModelAnswer]) -> Iterator[Reference]:
+    """The finest answer; none from bounds, and none from a single level that states no error."""
+    finest, changes = levels[-1], [abs(levels[-1].value[0] / before.value[0] - 1) for before in levels[-2:-1]]
+    doubts = changes if finest.stated is None else [*changes, finest.stated]
+    if doubts and not finest.certified and series.model not in peers.SLOW_TO_CONVERGE:
+        yield Reference(f"the finest {series.model}", series.program, finest.value, max(*doubts, DIGITS))
 
 
 def composed(body: Body, query: Query, best: dict[str, list[Reference]]) -> Iterator[Reference]:
@@ -284,10 +298,10 @@ def _best(references: Sequence[Reference], program: str) -> Reference:
     return min(others or references, key=lambda r: r.doubt)
 
 
-def _point(question: Question, series: Series, level: str, run: TimedAnswer, references: Sequence[Reference]) -> Point:
+def _point(question: Question, run: Run, references: Sequence[Reference]) -> Point:
     """A run beside the best answer of another program; beside one of its own program where there is no other."""
+    series, timed, answer = run.series, run.timed, run.timed.answer
     reference = _best(references, series.program)
-    answer = run.answer
     off = question.measure(answer.value, reference.value)
     within = question.measure(reference.value, answer.value)  # of what was stated of the answer
     contradicted = answer.stated is not None and within > answer.stated + reference.doubt
@@ -297,7 +311,7 @@ def _point(question: Question, series: Series, level: str, run: TimedAnswer, ref
             for end in (1 - answer.stated, 1 + answer.stated)
         )
     return Point(
-        question.key, series.model, level, series.program, max(off, reference.doubt), reference.doubt, answer.stated,
-        run.cold.cpu_s, run.warm.cpu_s, run.cold.wall_s, run.warm.wall_s, run.memory_mb, reference.name,
-        reference.program != series.program, answer.certified, contradicted,
+        question.key, series.model, run.level, series.program, max(off, reference.doubt), reference.doubt,
+        answer.stated, timed.cold.cpu_s, timed.warm.cpu_s, timed.cold.wall_s, timed.warm.wall_s, timed.memory_mb,
+        reference.name, reference.program != series.program, answer.certified, contradicted,
     )  # fmt: skip

@@ -1,16 +1,16 @@
 """Geometry of a cell for other programs: triangles of a cross-section, or a grid of boxes, between mirrors."""
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from sensorgen.core.arrays import Real, Whole
+from sensorgen.scene.repetition import Slice, cell
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import ROUNDING_MM, Section, sections
-from sensorgen.scene.unit_cell import Slice, cell
 from sensorgen.solvers.electrostatics.bounds import unmirrored
 from sensorgen.solvers.electrostatics.boxes import Grid, grid
 
@@ -77,11 +77,7 @@ def geometry(scene: Scene) -> PlaneSection | Grid:
 def _plane(section: Section, height_mm: float) -> PlaneSection:
     """The cell of a cross-section, its bands cut into triangles around their middles."""
     piece = cell(section, height_mm)
-    heights: dict[float, set[float]] = defaultdict(set)  # of corners on each vertical line
-    for part in piece.slices:
-        for band in part.bands:
-            for at, k in ((part.left_mm, 0), (part.right_mm, 1)):
-                heights[round(at, 9)] |= {round(band.bottom_mm[k], 9), round(band.top_mm[k], 9)}
+    heights = _heights(piece.slices)
     points: dict[Vertex, int] = {}
     triangles, materials, shares = [], [], []
     faces: dict[Edge, tuple[str, str]] = {}
@@ -89,8 +85,9 @@ def _plane(section: Section, height_mm: float) -> PlaneSection:
         for name, outline in _polygons(part, heights):
             middle = (sum(u for u, _ in outline) / len(outline), sum(v for _, v in outline) / len(outline))
             for a, b in pairwise([*outline, outline[0]]):
-                left, right = faces.get((a, b) if a < b else (b, a), ("", ""))
-                faces[(a, b) if a < b else (b, a)] = (name, right) if a < b else (left, name)
+                edge = (a, b) if a < b else (b, a)
+                left, right = faces.get(edge, ("", ""))
+                faces[edge] = (name, right) if a < b else (left, name)
                 if name not in ENDS:
                     triangles.append([points.setdefault(p, len(points)) for p in (middle, a, b)])
                     materials.append(name)
@@ -98,6 +95,16 @@ def _plane(section: Section, height_mm: float) -> PlaneSection:
     return PlaneSection(
         np.array(list(points)), np.array(triangles), tuple(materials), np.array(shares), faces, section.depth_mm
     )
+
+
+def _heights(slices: Iterable[Slice]) -> dict[float, set[float]]:
+    """Heights of corners on each vertical line."""
+    heights: dict[float, set[float]] = defaultdict(set)
+    for part in slices:
+        for band in part.bands:
+            for at, k in ((part.left_mm, 0), (part.right_mm, 1)):
+                heights[round(at, 9)] |= {round(band.bottom_mm[k], 9), round(band.top_mm[k], 9)}
+    return heights
 
 
 def _polygons(part: Slice, heights: dict[float, set[float]]) -> Iterator[tuple[str, list[Vertex]]]:
@@ -118,9 +125,14 @@ def share(cell: PlaneSection | Grid) -> float:
     return float(np.ravel(cell.shares)[0])
 
 
-def permittivities(section: PlaneSection, permittivity: "dict[str, float]") -> Real:
+def permittivities(section: PlaneSection, permittivity: Mapping[str, float]) -> Real:
     """Of each triangle, times how often it occurs [-]."""
     return np.array([permittivity[name] for name in section.materials]) * section.shares
+
+
+def fillings(grid: Grid, permittivity: Mapping[str, float]) -> Real:
+    """Permittivity by number of a box's filling, 0 of both electrodes [-]."""
+    return np.array([0.0, 0.0, *(permittivity[name] for name in grid.names[2:])])
 
 
 def nodes(planes_mm: Real, layers: int) -> Real:

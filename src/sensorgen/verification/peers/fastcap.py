@@ -5,7 +5,7 @@ over each electrode keeps field from its back.
 """
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -35,35 +35,73 @@ class _Face:
     within_mm: Real
 
 
+@dataclass(frozen=True)
+class _Image:
+    """The i-th and j-th mirror image of a cell, or with 0 and 0 the cell; its lowest corner and its size."""
+
+    i: int
+    j: int
+    low_mm: Real
+    size_mm: Real
+
+    @property
+    def ring(self) -> int:
+        """Number of images between this one and the cell, with this one."""
+        return max(abs(self.i), abs(self.j))
+
+    def sides(self, face: _Face) -> tuple[str, str]:
+        """Sides of a face; the cell's own part of the top electrode is "own"."""
+        first, second = face.sides
+        return "own" if first == "top" and self.ring == 0 and second != "lid" else first, second
+
+    def place(self, place: Real) -> tuple[float, ...]:
+        """Image of a place of the cell [mm]."""
+        image = np.array(place, float)
+        for axis, k in enumerate((self.i, self.j)):
+            inside = image[axis] - self.low_mm[axis]
+            shift = self.size_mm[axis] - inside if k % 2 else inside
+            image[axis] = self.low_mm[axis] + k * self.size_mm[axis] + shift
+        return tuple(image)
+
+
+def _ends(faces: Iterable[_Face]) -> tuple[Real, Real]:
+    """Lowest and highest corner of a cell."""
+    corners = np.array([f.corner_mm + k * f.along_mm + n * f.across_mm for f in faces for k in (0, 1) for n in (0, 1)])
+    return corners.min(0), corners.max(0)
+
+
+def _lid(end: str, low_mm: Real, size_mm: Real, z_mm: float) -> _Face:
+    """A lid over an electrode, as large as the cell."""
+    at = np.array([low_mm[0], low_mm[1], z_mm])
+    return _Face(at, np.diag(size_mm)[0], np.diag(size_mm)[1], (end, "lid"), at)
+
+
+def _images(low_mm: Real, size_mm: Real) -> Iterator[_Image]:
+    """The cell and its images around, as far as its field is high."""
+    rings = [max(_RINGS, int(np.ceil(_REACH * size_mm[2] / s))) for s in size_mm[:2]]
+    for i in range(-rings[0], rings[0] + 1):
+        for j in range(-rings[1], rings[1] + 1):
+            yield _Image(i, j, low_mm, size_mm)
+
+
 def capacitance(cell: cells.PlaneSection | Grid, permittivity: Mapping[str, float], panels: int) -> float:
     """Of the whole sensor [F], by so many panels along the height of the cell."""
     import fastcap2
 
     faces = list(_of_plane(cell) if isinstance(cell, cells.PlaneSection) else _of_boxes(cell))
-    corners = np.array([f.corner_mm + k * f.along_mm + n * f.across_mm for f in faces for k in (0, 1) for n in (0, 1)])
-    low, high = corners.min(0), corners.max(0)
+    low, high = _ends(faces)
     height, size = high[2] - low[2], high - low
-    for end, z in (("bottom", low[2] - height / 4), ("top", high[2] + height / 4)):  # the lids
-        at = np.array([low[0], low[1], z])
-        faces.append(_Face(at, np.diag(size)[0], np.diag(size)[1], (end, "lid"), at))
-    rings = [max(_RINGS, int(np.ceil(_REACH * height / s))) for s in size[:2]]
+    faces += [_lid("bottom", low, size, low[2] - height / 4), _lid("top", low, size, high[2] + height / 4)]
     surfaces: dict[tuple[str, str], fastcap2.Surface] = {}
-    for i in range(-rings[0], rings[0] + 1):
-        for j in range(-rings[1], rings[1] + 1):
-            ring = max(abs(i), abs(j))
-            longest = height / panels * _COARSER[min(ring, len(_COARSER) - 1)]
-            for face in faces:
-                own = face.sides[0] == "top" and ring == 0 and face.sides[1] != "lid"
-                key = ("own" if own else face.sides[0], face.sides[1])
-                if key not in surfaces:
-                    surfaces[key] = fastcap2.Surface(key[0])
-                within = _image(face.within_mm, i, j, low, size)
-                for quad in _panels(face, longest):
-                    moved = [tuple(_image(p, i, j, low, size)) for p in quad]
-                    if face.sides[0] in cells.ENDS:
-                        surfaces[key].add_quad(*moved)
-                    else:
-                        surfaces[key].add_quad(*moved, rp=tuple(within))
+    for image in _images(low, size):
+        longest = height / panels * _COARSER[min(image.ring, len(_COARSER) - 1)]
+        for face in faces:
+            key = image.sides(face)
+            if key not in surfaces:
+                surfaces[key] = fastcap2.Surface(key[0])
+            within = {} if face.sides[0] in cells.ENDS else {"rp": image.place(face.within_mm)}
+            for quad in _panels(face, longest):
+                surfaces[key].add_quad(*map(image.place, quad), **within)
     deep = cell.depth_mm / float(size[1]) if isinstance(cell, cells.PlaneSection) else 1.0
     return _charge(surfaces, permittivity) * cells.share(cell) * deep
 
@@ -100,15 +138,6 @@ def _mute() -> Iterator[None]:
         os.dup2(before, 1)
         os.close(before)
         os.close(nowhere)
-
-
-def _image(place: Real, i: int, j: int, low: Real, size: Real) -> Real:
-    """A place in the i-th and j-th mirror image of the cell."""
-    image = np.array(place, float)
-    for axis, k in enumerate((i, j)):
-        inside = image[axis] - low[axis]
-        image[axis] = low[axis] + k * size[axis] + (size[axis] - inside if k % 2 else inside)
-    return image
 
 
 def _panels(face: _Face, longest_mm: float) -> Iterator[list[Real]]:

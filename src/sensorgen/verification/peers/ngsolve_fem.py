@@ -23,7 +23,7 @@ def plane(section: cells.PlaneSection, permittivity: Mapping[str, float], unknow
     import netgen.meshing as netgen
     import ngsolve as ng
 
-    values = cells.permittivities(section, dict(permittivity))
+    values = cells.permittivities(section, permittivity)
     kinds, which = np.unique(values, return_inverse=True)
     netgen_mesh = netgen.Mesh(2)
     netgen_mesh.AddPoints(np.column_stack([section.points_mm, np.zeros(len(section.points_mm))]))
@@ -73,8 +73,9 @@ def boxes(grid: Grid, permittivity: Mapping[str, float], layers: int, order: int
     pieces = 2 * layers + 1
     fill = grid.fill.repeat(pieces, 0).repeat(pieces, 1).repeat(pieces, 2)
     shares = grid.shares.repeat(pieces, 0).repeat(pieces, 1)
-    values = np.array([0.0, 0.0, *(permittivity[name] for name in grid.names[2:])])
-    kinds = {v: k + 1 for k, v in enumerate(np.unique((values[fill] * shares[:, :, None])[fill > 1]))}
+    values = cells.fillings(grid, permittivity)
+    eps = values[fill] * shares[:, :, None]
+    kinds, which = np.unique(eps[fill > 1], return_inverse=True)
     netgen_mesh = netgen.Mesh(3)
     netgen_mesh.Add(netgen.FaceDescriptor(surfnr=1, domin=1, domout=0, bc=1))
     netgen_mesh.Add(netgen.FaceDescriptor(surfnr=2, domin=1, domout=0, bc=2))
@@ -86,9 +87,9 @@ def boxes(grid: Grid, permittivity: Mapping[str, float], layers: int, order: int
         return points[at]
 
     padded = np.pad(fill, 1, constant_values=-1)
-    for at in np.argwhere(fill > 1).tolist():
+    for at, kind in zip(np.argwhere(fill > 1).tolist(), which.tolist(), strict=True):
         corners = [point(tuple(a + d for a, d in zip(at, step, strict=True))) for step in _BRICK]
-        netgen_mesh.Add(netgen.Element3D(kinds[values[fill[tuple(at)]] * shares[at[0], at[1]]], corners))
+        netgen_mesh.Add(netgen.Element3D(kind + 1, corners))
         x, y, z = (a + 1 for a in at)
         around = (padded[x, y, z - 1], padded[x, y, z + 1], padded[x, y - 1, z], padded[x, y + 1, z],
                   padded[x + 1, y, z], padded[x - 1, y, z])  # fmt: skip
@@ -97,7 +98,7 @@ def boxes(grid: Grid, permittivity: Mapping[str, float], layers: int, order: int
                 netgen_mesh.Add(netgen.Element2D(int(neighbour) + 1, [corners[k] for k in side]))
     netgen_mesh.SetBCName(0, "bottom")
     netgen_mesh.SetBCName(1, "top")
-    for k in kinds.values():
-        netgen_mesh.SetMaterial(k, f"m{k}")
-    energy, _, _ = _solved(ng, ng.Mesh(netgen_mesh), ng.CoefficientFunction(list(kinds)), order)
+    for k in range(len(kinds)):
+        netgen_mesh.SetMaterial(k + 1, f"m{k}")
+    energy, _, _ = _solved(ng, ng.Mesh(netgen_mesh), ng.CoefficientFunction(kinds.tolist()), order)
     return energy * EPS0_F_PER_M * M_PER_MM

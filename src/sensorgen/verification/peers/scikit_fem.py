@@ -19,7 +19,7 @@ def plane(section: cells.PlaneSection, permittivity: Mapping[str, float], unknow
     import skfem
     from skfem.helpers import dot, grad
 
-    values = cells.permittivities(section, dict(permittivity))
+    values = cells.permittivities(section, permittivity)
     mesh = skfem.MeshTri(section.points_mm.T.copy(), section.triangles.T.copy())
     finder, electrodes = mesh.element_finder(), section.electrode_edges()
     while True:
@@ -71,7 +71,7 @@ def boxes(grid: Grid, permittivity: Mapping[str, float], layers: int) -> float:
         for planes, middle in zip(grid.planes_mm, mesh.p[:, mesh.t].mean(1), strict=True)
     ]
     fill = grid.fill[tuple(at)]
-    values = np.array([0.0, 0.0, *(permittivity[name] for name in grid.names[2:])])
+    values = cells.fillings(grid, permittivity)
     field = np.flatnonzero(fill > 1)
     basis = skfem.Basis(mesh, skfem.ElementHex2(), elements=field, intorder=4)
     eps = (values[fill] * grid.shares[at[0], at[1]])[field]

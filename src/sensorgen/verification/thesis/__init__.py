@@ -1,6 +1,6 @@
 """The thesis, reproduced: every numbered equation, table and figure with its value, ours, and a verdict."""
 
 from sensorgen.verification.thesis.documents import html, markdown, plain
-from sensorgen.verification.thesis.reproduced import ReproducedItem, rows
+from sensorgen.verification.thesis.items import ReproducedItem, rows
 
 __all__ = ["ReproducedItem", "html", "markdown", "plain", "rows"]

@@ -39,18 +39,9 @@ class Item(Strict):
         if bool(self.design) == bool(self.shape):
             both = "both" if self.design else "neither"
             raise BadInput(f"{both} of design and shape given; expected one: a design file, or a shape with parameters")
-        if not self.design:
-            return {"shape": self.shape, "parameters": self.parameters, "materials": self.materials}
-        path = folder / self.design
-        if not path.exists():
-            raise _unknown(self.design, path)
-        base = design_files.with_own_files(yamlfile.read(path), path.parent)
-        changes = {"parameters": self.parameters, "materials": packs.slots(self.materials)}
-        changes = {key: own for key, own in changes.items() if own}
-        if not changes:
-            return {"name": path.stem} | base
-        unnamed = {key: value for key, value in base.items() if key != "name"}
-        return unnamed | {key: _over(base.get(key, {}), own) for key, own in changes.items()}
+        if self.design:
+            return _of_file(self, folder / self.design)
+        return {"shape": self.shape, "parameters": self.parameters, "materials": self.materials}
 
 
 class Layout(Strict):
@@ -80,6 +71,10 @@ class Bake(Strict):
     temperature_c: Annotated[float, Field(gt=0, le=400)]
     hours: Annotated[float, Field(gt=0, le=1000)]
     note: Line = ""
+
+    def words(self) -> str:
+        """The step as a line of a checklist."""
+        return f"Bake at {self.temperature_c:g} C for {self.hours:g} h" + (f": {self.note}" if self.note else "")
 
 
 class Labels(Strict):
@@ -154,6 +149,19 @@ def load(path: Path) -> BatchPlan:
     except SensorgenError as error:
         raise error.within(str(path)) from None
     return plan
+
+
+def _of_file(item: Item, path: Path) -> dict[str, Any]:
+    """The design of an item's file; nameless where values of the item go before the file's."""
+    if not path.exists():
+        raise _unknown(item.design, path)
+    base = design_files.with_own_files(yamlfile.read(path), path.parent)
+    changes = {"parameters": item.parameters, "materials": packs.slots(item.materials)}
+    changes = {key: own for key, own in changes.items() if own}
+    if not changes:
+        return {"name": path.stem} | base
+    unnamed = {key: value for key, value in base.items() if key != "name"}
+    return unnamed | {key: _over(base.get(key, {}), own) for key, own in changes.items()}
 
 
 def _over(base: Any, own: dict[str, Any]) -> Any:

@@ -278,7 +278,6 @@ def tools(plan: BatchPlan, loaded: Mapping[int, str], texts: materials.Texts) ->
 def checklist(plan: BatchPlan, loaded: Mapping[str, Spool]) -> tuple[str, ...]:
     """Steps by hand before, at and after the print, in this order."""
     numbers = ", ".join(f"T{tool}" for tool in loaded)
-    bake = [f"Bake at {b.temperature_c:g} C for {b.hours:g} h" + (f": {b.note}" if b.note else "") for b in plan.bake]
     return (
         *(f"Dry {s.name}: {s.drying or 'no source says how'}" for s in loaded.values()),
         *(f"Load T{tool} with {s.name}" for tool, s in loaded.items()),
@@ -287,7 +286,7 @@ def checklist(plan: BatchPlan, loaded: Mapping[str, Spool]) -> tuple[str, ...]:
         "Clean the plate, home, and level it",
         "Watch the first layer of every specimen; note which failed",
         "Label every specimen before it leaves the plate",
-        *(["Measure R along the electrodes and between them, not baked"] if bake else []),
-        *bake,
-        "Measure R along the electrodes and between them" + (", baked" if bake else ""),
+        *(["Measure R along the electrodes and between them, not baked"] if plan.bake else []),
+        *(step.words() for step in plan.bake),
+        "Measure R along the electrodes and between them" + (", baked" if plan.bake else ""),
     )

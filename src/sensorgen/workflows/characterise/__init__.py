@@ -29,7 +29,7 @@ from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError
 from sensorgen.core.version import __version__
 from sensorgen.design import materials, packs
 from sensorgen.design.design import Design
-from sensorgen.design.materials import Material, own
+from sensorgen.design.materials import Material, SourceValue, source_file, source_path
 from sensorgen.export import machine
 from sensorgen.export.slicers.loads import load, recipe
 from sensorgen.prediction.inference import Parameter
@@ -435,11 +435,11 @@ class Characterised:
             f"coupons of {self.conductor} and {self.dielectric}: {self.readings} readings of {self.coupons} coupons; "
             f"95 % intervals; sensorgen {__version__}"
         )
-        known = [(r.material, own.SourceValue(r.quantity, r.value, r.low, r.high, r.title)) for r in self.rows
+        known = [(r.material, SourceValue(r.quantity, r.value, r.low, r.high, r.title)) for r in self.rows
                  if r.determined()]  # fmt: skip
         names = (self.conductor, self.dielectric)
         materials = {name: [value for of, value in known if of == name] for name in names}
-        return own.written(about, materials, self.findings)
+        return source_file(about, materials, self.findings)
 
 
 def _source_name(given: str, plate: str) -> str:
@@ -473,7 +473,7 @@ def read(path: Path, source: str = "", *, keep: bool = True, force: bool = False
     """
     form = forms.read(path)
     label = _source_name(source, form.plate)
-    file = own.path(label)
+    file = source_path(label)
     if keep and not force and os.path.lexists(file):
         raise BadInput(f"{file}: there is a source {label} already; choose another --name, or --force replaces it")
     try:

@@ -20,8 +20,7 @@ from sensorgen.core.parallel import Lane, open_lanes, remembered, said
 from sensorgen.workflows.moves import Candidate, Search
 from sensorgen.workflows.optimise import ladder
 from sensorgen.workflows.optimise.ladder import AT_REST, COARSE
-from sensorgen.workflows.optimise.space import Space
-from sensorgen.workflows.optimise.target import NUMBERS, Target
+from sensorgen.workflows.optimise.target import NUMBERS, Space, Target
 from sensorgen.workflows.trial import Trial
 
 MARGIN = 1.5  # between a number on the coarse mesh and its best value; widened where a design shows more
@@ -301,7 +300,7 @@ def search(
 
 def value_of(key: str, row: Candidate) -> Bounds | None:
     """A number of an evaluated design, as printed."""
-    return NUMBERS[key].of(row.trial.printed, row.trial.toolpath) if row.trial else None
+    return NUMBERS[key].of_print(row.trial) if row.trial else None
 
 
 def badness(target: Target, row: Candidate) -> dict[str, Interval]:
@@ -394,6 +393,7 @@ SEED = 1
 _STEPS = 1 << 20  # of the share of a range: finer than any grid
 _IDLE = 5  # generations without a new design, after which the search ends
 _WORST = 1e30  # objective of a design that has none
+_Rows = dict[tuple[object, ...], Candidate]  # by their values
 
 
 def sample(
@@ -432,26 +432,31 @@ def sample(
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     sampler = optuna.samplers.NSGAIISampler(population_size=POPULATION, seed=SEED)
     study = optuna.create_study(directions=["minimize"] * len(target.objectives), sampler=sampler)
-    rows: dict[tuple[object, ...], Candidate] = {}
+    rows: _Rows = {}
     idle = 0
     with workers.opened() as opened:
         front = Front(target, opened, keep=keep, progress=progress)
         while len(rows) < count and idle < _IDLE:
-            before, asked = len(rows), []
-            for trial in [study.ask() for _ in range(POPULATION)]:
-                part = trial.suggest_int("part", 0, len(space.parts) - 1)
-                shares = {key: trial.suggest_int(key, 0, _STEPS - 1) / _STEPS for key in space.parts[part][1]}
-                candidate = space.at(part, shares)
-                values = tuple(candidate.values.values())
-                if values in rows or len(rows) < count:
-                    asked.append((trial, rows.setdefault(values, candidate)))
+            before = len(rows)
+            generation = list(_generation(study, space, rows, count))
             front.run(front.made(list(rows.values())[before:]))
-            for trial, row in asked:
+            for trial, row in generation:
                 trial.set_constraint("violated", sum(row.violated.values()))
                 study.tell(trial, _objectives(target, row))
             idle = idle + 1 if len(rows) == before else 0
     front.whole = space.size
     return front
+
+
+def _generation(study: Any, space: Space, rows: _Rows, count: int) -> Iterator[tuple[Any, Candidate]]:
+    """Trials of a study and their designs, which join those before, up to so many."""
+    for trial in [study.ask() for _ in range(POPULATION)]:
+        part = trial.suggest_int("part", 0, len(space.parts) - 1)
+        shares = {key: trial.suggest_int(key, 0, _STEPS - 1) / _STEPS for key in space.parts[part][1]}
+        candidate = space.at(part, shares)
+        values = tuple(candidate.values.values())
+        if values in rows or len(rows) < count:
+            yield trial, rows.setdefault(values, candidate)
 
 
 def _objectives(target: Target, row: Candidate) -> Sequence[float]:

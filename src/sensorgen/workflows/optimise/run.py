@@ -25,8 +25,7 @@ from sensorgen.workflows.moves import Candidate, EarlyNumber
 from sensorgen.workflows.optimise import ladder
 from sensorgen.workflows.optimise.front import HERE, Front, Progress, Workers, sample, search, settled, value_of, worth
 from sensorgen.workflows.optimise.result import Chosen, ObjectiveSpread, Optimised, Recommended, chosen, leads, result
-from sensorgen.workflows.optimise.space import Space, candidates, grid_mm, space
-from sensorgen.workflows.optimise.target import NUMBERS, Target, load
+from sensorgen.workflows.optimise.target import NUMBERS, Space, Target, candidates, grid_mm, load, space
 from sensorgen.workflows.slice import slice_design
 from sensorgen.workflows.trial import trial
 
@@ -83,8 +82,8 @@ def page(result: Optimised) -> str:
     names = list(dict.fromkeys([*result.objectives, *(n for c in result.front for n in c.numbers)]))
     across, up = names[0], names[min(1, len(names) - 1)]
     curves = tuple(
-        _points(name, colour, shown, across, up)
-        for name, (colour, some) in _groups(result).items() if (shown := _known(some, across, up))
+        _points(name, _COLOURS[name], shown, across, up)
+        for name, some in _groups(result).items() if (shown := _known(some, across, up))
     )  # fmt: skip
     x, y = (NUMBERS[key].words for key in (across, up))
     axes = [Axis(f"{NUMBERS[key].words} [{NUMBERS[key].unit}]", log=True) for key in (across, up)]
@@ -100,16 +99,24 @@ def page(result: Optimised) -> str:
     return pages.page(f"Best designs: {result.name}", words, [section])
 
 
-def _groups(result: Optimised) -> dict[str, tuple[str, list[Chosen]]]:
-    """Colour and designs of each group, by its name."""
-    front = {c.number for c in result.front}
-    others = [c for c in result.designs if c.numbers and (c.violated or c.number not in front)]
-    return {
-        "no best values are better": (BLUE, [c for c in result.front if c.leads]),
-        "perhaps as good, by its range": (ORANGE, [c for c in result.front if not c.leads]),
-        "evaluated": (GREY, [c for c in others if not c.violated]),
-        "violates a constraint": (PINK, [c for c in others if c.violated]),
-    }
+_COLOURS = {
+    "no best values are better": BLUE,
+    "perhaps as good, by its range": ORANGE,
+    "evaluated": GREY,
+    "violates a constraint": PINK,
+}  # of groups of designs
+
+
+def _groups(result: Optimised) -> dict[str, list[Chosen]]:
+    """Designs of each group, by its name: those of the front first, then all others with numbers."""
+    front = {one.number for one in result.front}
+    groups: dict[str, list[Chosen]] = {name: [] for name in _COLOURS}
+    for one in result.front:
+        groups["no best values are better" if one.leads else "perhaps as good, by its range"].append(one)
+    for one in result.designs:
+        if one.numbers and one.number not in front:
+            groups["violates a constraint" if one.violated else "evaluated"].append(one)
+    return groups
 
 
 def _known(some: list[Chosen], *keys: str) -> list[Chosen]:
@@ -184,19 +191,22 @@ def _robust(
 
     Under the top that is the worst of the design itself: another one seldom overtakes it, and takes as long.
     """
-    keys, query = [key for key in target.objectives if key in ladder.COARSE], target.query()
-    pressed = [key for key in keys if key not in ladder.AT_REST]
-    inputs, owners = list[tuple[Any, ...]](), list[int]()
-    for row in rows:
-        top = max(TOPS, key=partial(_under, target, row.design, pressed[0])) if pressed else EVEN
-        designs = [(row.design, ""), *((row.design, rule) for rule in rules(None))]
-        designs += [(design, rules(None)[0]) for design in within_tolerance(target, row.design)]
-        inputs += [(design, query, bool(pressed), rule, (top,), ROUGH) for design, rule in designs]
-        owners += [row.number] * len(designs)
+    keys = [key for key in target.objectives if key in ladder.COARSE]
+    works = [(row.number, work) for row in rows for work in _variants(target, row.design, keys)]
     numbers: dict[int, list[dict[str, EarlyNumber]]] = {row.number: [] for row in rows}
-    for k, one in sorted(workers.results(ladder.known, inputs, "lost", keep=keep)):  # first its own walls
-        numbers[owners[k]].append({} if isinstance(one, str) else one)
+    answers = workers.results(ladder.known, [work for _, work in works], "lost", keep=keep)
+    for k, one in sorted(answers):  # first of its own walls
+        numbers[works[k][0]].append({} if isinstance(one, str) else one)
     return {row.number: dict(_spreads(target, keys, row, numbers[row.number])) for row in rows}
+
+
+def _variants(target: Target, design: Design, keys: Sequence[str]) -> Iterator[tuple[Any, ...]]:
+    """Arguments of :func:`.ladder.known` for the design by its own walls, by others, and with other lengths."""
+    pressed = [key for key in keys if key not in ladder.AT_REST]
+    top = max(TOPS, key=partial(_under, target, design, pressed[0])) if pressed else EVEN
+    by_others = ((one, rules(None)[0]) for one in within_tolerance(target, design))
+    for one, rule in ((design, ""), *((design, rule) for rule in rules(None)), *by_others):
+        yield one, target.query(), bool(pressed), rule, (top,), ROUGH
 
 
 def _under(target: Target, design: Design, key: str, top: str) -> float:
@@ -252,7 +262,7 @@ def _built(one: Recommended, target: Target, design: Design, out: Path, sliced: 
         tried = trial(design, target.query(), folder=folder, drawn=False)
     except SensorgenError as error:
         return replace(one, slicer=str(error), sliced=None)
-    values = {key: NUMBERS[key].of(tried.printed, tried.toolpath) for key in target.objectives}
+    values = {key: NUMBERS[key].of_print(tried) for key in target.objectives}
     return replace(one, sliced={key: value for key, value in values.items() if value and key in one.design.numbers})
 
 

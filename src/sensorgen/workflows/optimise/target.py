@@ -1,8 +1,12 @@
-"""A target as it is written, in a YAML file: what to vary, what to reach, and what is not accepted."""
+"""A target as written in a YAML file: what to vary, what to reach, what is not accepted; and its designs.
 
-from collections.abc import Mapping
+Those are every combination of its values, heights in layers and widths in half lines.
+"""
+
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
-from math import inf
+from itertools import filterfalse, product
+from math import ceil, floor, inf, prod
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,7 +15,7 @@ from pydantic import Field, model_validator
 from sensorgen.checks.rules import RULES
 from sensorgen.core import yamlfile
 from sensorgen.core.bounds import Bounds, Interval
-from sensorgen.core.errors import UnknownName, within
+from sensorgen.core.errors import BadInput, SensorgenError, UnknownName, within
 from sensorgen.core.records import Strict, checked
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import best, packs
@@ -19,7 +23,7 @@ from sensorgen.design.design import Design, make, with_own_files
 from sensorgen.prediction.identifiability.results import GUESS
 from sensorgen.prediction.query import DEFAULT, FORCE_N, NOISE, Query
 from sensorgen.scene.scene import Envelope
-from sensorgen.workflows.moves import lengths
+from sensorgen.workflows.moves import Candidate, Value, lengths, with_values
 from sensorgen.workflows.trial import Numbers, Toolpath, Trial
 
 
@@ -64,6 +68,10 @@ class Number:
             value = Bounds.of(value, self.unit, model=wide.model.times(value / wide.value) if wide else None)
         bounds: Bounds = value.times(1 / self.size, self.unit)
         return bounds
+
+    def of_print(self, trial: Trial) -> Bounds | None:
+        """Value of the print of a trial; None where unknown."""
+        return self.of(trial.printed, trial.toolpath)
 
     def uninformed(self, trial: Trial) -> float:
         """The error without any reading, length or load over sqrt(12) [unit of the name]; infinite of other numbers."""
@@ -232,18 +240,19 @@ class Target(Strict):
 
     def violated(self, trial: Trial) -> dict[str, float]:
         """Constraints that a trial violates, and by how much, relative [-]."""
-        found = {f"check {f.rule}": 1.0 for f in trial.findings if self.refuses(f.severity, f.rule)}
+        beyond = {f"check {f.rule}": 1.0 for f in trial.findings if self.refuses(f.severity, f.rule)}
         if trial.status != "predicted":
-            found[trial.status] = 1.0
-        found |= {f"doubt: {d}": 1.0 for d in trial.doubts if not self.accepts(d)}
-        for key, limit in self.limits.items():
-            value = NUMBERS[key].of(trial.printed, trial.toolpath)
-            if beyond := 1.0 if value is None else limit.beyond(value.value):
-                found[f"limit {key}"] = beyond
+            beyond[trial.status] = 1.0
+        beyond |= {f"doubt: {doubt}": 1.0 for doubt in filterfalse(self.accepts, trial.doubts)}
+        beyond |= {f"limit {key}": share for key in self.limits if (share := self._beyond_limit(key, trial))}
         if trial.status == "predicted":
-            unknown = (k for k in self.objectives if NUMBERS[k].of(trial.printed, trial.toolpath) is None)
-            found |= {f"unknown {key}": 1.0 for key in unknown}
-        return found
+            beyond |= {f"unknown {key}": 1.0 for key in self.objectives if NUMBERS[key].of_print(trial) is None}
+        return beyond
+
+    def _beyond_limit(self, key: str, trial: Trial) -> float:
+        """Distance of a number beyond its limit, relative [-]; 1 of an unknown one."""
+        value = NUMBERS[key].of_print(trial)
+        return 1.0 if value is None else self.limits[key].beyond(value.value)
 
     def accepts(self, doubt: str) -> bool:
         """Test whether there is no doubt, or an accepted one."""
@@ -326,3 +335,180 @@ def _beside(design: Design, name: str, value: float, vertical: bool) -> list[flo
     layer, grows = design.layers.layer_mm, name in asdict(Envelope()) or name.endswith("dielectric_mm")
     whole = max(round(value / layer), 1)
     return [round(n * layer, 6) for n in ((whole + 1,) if grows else (whole - 1, whole + 1)) if n]
+
+
+MOST = 20_000  # designs: their checks alone take half an hour on two cores
+_NEAR = 1e-9
+Data = dict[str, Any]
+Part = tuple[dict[str, Value], dict[str, list[Value]]]  # choices, and values that they leave the shape's parameters
+
+
+@dataclass(frozen=True)
+class Space:
+    """Every combination of the values of a target.
+
+    Attributes
+    ----------
+    base : dict
+        The design that is varied, as data.
+    folder : Path
+        From which files of materials, printers and shapes are seen.
+    lengths : frozenset of str
+        Parameters of the shape.
+    parts : tuple
+        Choices, and the values of the shape's parameters that they leave.
+    """
+
+    base: Data
+    folder: Path
+    lengths: frozenset[str]
+    parts: tuple[Part, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of designs."""
+        return sum(prod(len(values) for values in inside.values()) for _, inside in self.parts)
+
+    def candidate(self, values: dict[str, Value]) -> Candidate:
+        """The design with these values."""
+        try:
+            return Candidate(values, make(with_own_files(_with(self.base, self.lengths, values), self.folder)))
+        except SensorgenError as error:
+            return Candidate(values, discarded=str(error))
+
+    def at(self, part: int, shares: Mapping[str, float]) -> Candidate:
+        """The design of a part, by the share of each range that lies below its value, from 0 to below 1."""
+        chosen, inside = self.parts[part]
+        return self.candidate(chosen | {k: values[int(shares[k] * len(values))] for k, values in inside.items()})
+
+
+def candidates(target: Target, folder: Path = Path()) -> list[Candidate]:
+    """Every design of a target.
+
+    Parameters
+    ----------
+    target : Target
+        Its base design and the values that it takes.
+    folder : Path
+        Of the target's file, from which files of materials, printers and shapes are seen.
+
+    Raises
+    ------
+    UnknownName
+        A parameter that neither the shape nor a design file has.
+    BadInput
+        No design at all, none with one of the values that are listed, or more than ``MOST``.
+    """
+    whole = space(target, folder)
+    if whole.size > MOST:
+        longest = max(((len(v), k) for _, inside in whole.parts for k, v in inside.items()), default=(0, ""))
+        raise BadInput(
+            f"{whole.size:.3g} designs; expected at most {MOST}: give a larger step, narrower ranges or fewer choices "
+            f"({longest[1]} alone has {longest[0]} values), or --sample 400, which proves nothing"
+        )
+    every = [whole.candidate(chosen | values) for chosen, inside in whole.parts for values in _combinations(inside)]
+    for key, given in target.parameters.items():
+        if not isinstance(given, Range):
+            _refuse_impossible(key, given, every)
+    return every
+
+
+def _refuse_impossible(key: str, values: list[Value], every: list[Candidate]) -> None:
+    """Refuse a value that no design can have."""
+    for value in values:
+        own = [candidate for candidate in every if candidate.values.get(key) == value]
+        if own and not any(candidate.made for candidate in own):
+            raise BadInput(f"parameters.{key}: no design can have {value!r}: {own[0].discarded}")
+
+
+def space(target: Target, folder: Path = Path()) -> Space:
+    """The space of a target, of any size; raises as :func:`candidates`."""
+    design = target.design if isinstance(target.design, Mapping) else {}
+    base = with_own_files({k: v for k, v in design.items() if k != "name"}, folder)
+    known = frozenset(asdict(make(base).params))
+    _refuse_unknown(target, known)
+    whole = Space(base, folder, known, tuple(_parts(target, base, folder, known)))
+    if not whole.size:
+        raise BadInput(
+            f"no printable value of {', '.join(_empty(whole, target))} in its range: expected a whole layer or half "
+            "line in it"
+        )
+    return whole
+
+
+def _parts(target: Target, base: Data, folder: Path, known: frozenset[str]) -> Iterator[Part]:
+    """Choices, as of a nozzle, which set the grid of lengths, with the values on it; then further single designs."""
+    lengths_of_shape = {key: given for key, given in target.parameters.items() if key in known}
+    others = {key: _listed(given) for key, given in target.parameters.items() if key not in known}
+    for chosen in _combinations(others):
+        yield (
+            chosen,
+            {
+                key: _values(key, given, with_own_files(_with(base, known, chosen), folder))
+                for key, given in lengths_of_shape.items()
+            },
+        )
+    for one in target.also:
+        yield {}, {key: [value] for key, value in one.items()}
+
+
+def _empty(whole: Space, target: Target) -> list[str]:
+    """Parameters without a printable value."""
+    inner = {key for _, inside in whole.parts for key, values in inside.items() if not values}
+    outer = {key for key, given in target.parameters.items() if key not in whole.lengths and not _listed(given)}
+    return sorted(inner | outer)
+
+
+def _refuse_unknown(target: Target, known: frozenset[str]) -> None:
+    """Refuse a parameter that no design has, and a range without a step that has no printable grid."""
+    for key, given in target.parameters.items():
+        if key not in known and key.partition(".")[0] not in Design.model_fields:
+            raise UnknownName(
+                "parameter to vary", key, [*known, "quality", "materials.film", "orientation", "nozzle_mm"]
+            )
+        if isinstance(given, Range) and key not in known and given.step is None:
+            raise BadInput(f"parameters.{key}: a range without a step; only lengths of the shape have a printable grid")
+
+
+def _combinations(space: Mapping[str, list[Value]]) -> Iterator[dict[str, Value]]:
+    for values in product(*space.values()):
+        yield dict(zip(space, values, strict=True))
+
+
+def _with(base: Data, known: frozenset[str], values: Mapping[str, Value]) -> Data:
+    """The base design as data with other values."""
+    return with_values(
+        {k: v for k, v in base.items() if k != "name"},
+        {("parameters", key) if key in known else tuple(key.split(".")): value for key, value in values.items()},
+    )
+
+
+def _listed(given: Range | list[Value]) -> list[Value]:
+    """Choices as written, or numbers by their step."""
+    if isinstance(given, list):
+        return list(dict.fromkeys(given))
+    step = given.step or 1.0
+    return _steps(given.first, step, floor((given.to - given.first) / step + _NEAR) + 1)
+
+
+def _values(key: str, given: Range | list[Value], data: Data) -> list[Value]:
+    """Values of a parameter: on the printable grid where a range has no step."""
+    if isinstance(given, list) or given.step is not None:
+        return _listed(given)
+    step = grid_mm(make(data), key)
+    low, high = ceil(given.first / step - _NEAR), floor(given.to / step + _NEAR)
+    return _steps(low * step, step, high - low + 1)
+
+
+def _steps(first: float, step: float, count: int) -> list[Value]:
+    if count > MOST:
+        raise BadInput(
+            f"{count:.3g} values from {first:g} in steps of {step:g}; expected at most {MOST} designs in all"
+        )
+    return [round(first + k * step, 9) for k in range(count)]
+
+
+def grid_mm(design: Design, key: str) -> float:
+    """Printable step of a length: a layer where it moves a face up or down, else half a line [mm]."""
+    is_height = {name: up for name, _, up in lengths(design)}.get(key, "height" in key or key == "isolation_mm")
+    return design.layers.layer_mm if is_height else design.machine.line_mm() / 2

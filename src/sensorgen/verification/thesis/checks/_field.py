@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
-from sensorgen.verification.thesis.verdicts import ItemPart, Parts
+from sensorgen.verification.thesis.items import ItemPart, Parts
 
 LENGTH_M, WIDTH_M, HEIGHT_M, FILM_M = 0.1, 0.01, 3e-4, 6e-4  # Table 3.1
 EPS_R = 4.68

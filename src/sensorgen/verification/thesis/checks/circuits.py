@@ -9,8 +9,7 @@ from sensorgen.design import design as designs
 from sensorgen.models import columns, fem2d, line
 from sensorgen.verification.thesis.checks._columns import EPS_R, FILM_MM, PERMITTIVITY, Layer, piles, piles_f
 from sensorgen.verification.thesis.checks._field import INPUT_V, LENGTH_M, OMEGA, RHO_OHM_M, TRACKS
-from sensorgen.verification.thesis.items import table
-from sensorgen.verification.thesis.verdicts import ItemPart, Parts
+from sensorgen.verification.thesis.items import ItemPart, Parts, table
 
 _PLATE_M, _PLATE_M2 = 0.6e-3, 1e-3  # Table 3.1
 _PLATE = designs.make({"shape": "reference"})

@@ -8,8 +8,7 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
-from sensorgen.verification.thesis.items import table
-from sensorgen.verification.thesis.verdicts import ItemPart, Parts
+from sensorgen.verification.thesis.items import ItemPart, Parts, table
 
 _LOW_HZ, _TONE_HZ = 1.1e3, 99.7e3
 _MISSED_OHM = 2.0

@@ -13,7 +13,7 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
 from sensorgen.verification.thesis.checks import _field
 from sensorgen.verification.thesis.checks._field import EPS_R, FILM_M, GAMMA, INPUT_V, LENGTH_M, LINE, OMEGA, TRACKS
-from sensorgen.verification.thesis.verdicts import ItemPart, Parts
+from sensorgen.verification.thesis.items import ItemPart, Parts
 
 _X = _field.PLACES_M
 _DX = _field.STEP_M
@@ -91,23 +91,20 @@ def slope_by_permittivity() -> Parts:
 
 def slope_by_impedance() -> Parts:
     """2.13: an impedance stands where an admittance per length belongs."""
-    yield ItemPart(
-        "dI1/dx", "A/m", LINE.current_a.at(_X, 1), 1j * _SLICE_OHM * _difference(), -_difference() / (_SLICE_OHM * _DX)
-    )
+    printed, corrected = 1j * _SLICE_OHM * _difference(), -_difference() / (_SLICE_OHM * _DX)
+    yield ItemPart("dI1/dx", "A/m", LINE.current_a.at(_X, 1), printed, corrected)
 
 
 def bend_by_permittivity() -> Parts:
     """B.16: bend of the potential by permittivity."""
-    return _wrong_sign(
-        "d2U1/dx2", "V/m2", _u(order=2), -_RHO_OVER_H * 1j * OMEGA * EPS0_F_PER_M * EPS_R / FILM_M * _difference()
-    )
+    printed = -_RHO_OVER_H * 1j * OMEGA * EPS0_F_PER_M * EPS_R / FILM_M * _difference()
+    return _wrong_sign("d2U1/dx2", "V/m2", _u(order=2), printed)
 
 
 def bend_by_impedance() -> Parts:
     """2.14: bend of the potential by impedance."""
-    yield ItemPart(
-        "d2U1/dx2", "V/m2", _u(order=2), -1j * _RHO_OVER_H * _SLICE_OHM * _difference(), _GAMMA_BY_CELL * _difference()
-    )
+    printed, corrected = -1j * _RHO_OVER_H * _SLICE_OHM * _difference(), _GAMMA_BY_CELL * _difference()
+    yield ItemPart("d2U1/dx2", "V/m2", _u(order=2), printed, corrected)
 
 
 def conduction_by_impedance() -> Parts:

@@ -14,8 +14,7 @@ from sensorgen.prediction import compression as compressed
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
-from sensorgen.verification.thesis.items import table
-from sensorgen.verification.thesis.verdicts import ItemPart, Parts
+from sensorgen.verification.thesis.items import ItemPart, Parts, table
 
 _KPA = 100.0
 _M_PER_UM = 1e-6
@@ -33,15 +32,9 @@ def _pressed(
 ) -> compressed.CompressionResult:
     """A cell under 100 kPa, of the cache where it was solved before."""
     design = designs.make({"shape": shape, "parameters": parameters})
-    curve = compressed.answer(
-        drawn(design),
-        compressed.PressQuestion(
-            (0.0, _KPA),
-            compressed.BoundaryConditions(base=base, period=period),
-            sides="symmetric",
-            tip=Tip(block=EVEN),
-        ),
-    )
+    boundary, tip = compressed.BoundaryConditions(base=base, period=period), Tip(block=EVEN)
+    question = compressed.PressQuestion((0.0, _KPA), boundary, sides="symmetric", tip=tip)
+    curve = compressed.answer(drawn(design), question)
     if curve.faults or None in curve.displacement_um:
         raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {'; '.join(curve.faults or curve.doubts)}")
     return curve

@@ -19,7 +19,7 @@ from sensorgen.verification.thesis.checks._field import (
     RHO_OHM_M,
     WIDTH_M,
 )
-from sensorgen.verification.thesis.verdicts import ItemPart, Parts
+from sensorgen.verification.thesis.items import ItemPart, Parts
 
 _FORCE_N, _PATCH_M, _LEFT_M, _MODULUS_PA = 3.0, 0.01, 0.045, 6e6  # Table 3.1; the tip of Table C.1 in the middle
 _S_PER_N = 0.02  # a piezoresistance that shows; no source gives one
@@ -49,9 +49,8 @@ def by_powers() -> Parts:
     current, voltage = _field.LINE.current_a.at(x), _field.LINE.difference_v.at(x)
     heat = weights @ abs(current) ** 2 * _RESISTANCE_OHM / 2
     stored = weights @ abs(voltage) ** 2 * _field.OMEGA * _CAPACITANCE_F / 2
-    return _field.both_parts(
-        "Z", "ohm", _field.LINE.impedance_ohm, complex(heat, -stored) / abs(_field.LINE.input_a) ** 2
-    )
+    printed = complex(heat, -stored) / abs(_field.LINE.input_a) ** 2
+    return _field.both_parts("Z", "ohm", _field.LINE.impedance_ohm, printed)
 
 
 def corner() -> Parts:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from sensorgen.verification.thesis.checks import _field
 from sensorgen.verification.thesis.checks._field import GAMMA, INPUT_V, LENGTH_M, LINE, PLACES_M, RHO_OHM_M, K
-from sensorgen.verification.thesis.verdicts import ItemPart, Parts
+from sensorgen.verification.thesis.items import ItemPart, Parts
 
 HW = _field.AREA_M2
 _X = PLACES_M
@@ -50,12 +50,8 @@ def _printed(length_m: float) -> tuple[complex, complex, complex]:
 
 def eigenvalue_problem() -> Parts:
     """B.20, B.21: the matrix applied to the potentials gives their second derivatives."""
-    yield ItemPart(
-        "d2U/dx2",
-        "V/m2",
-        np.array([LINE.top_v(_X, 2), LINE.bottom_v(_X, 2)]),
-        _MATRIX @ np.array([LINE.top_v(_X), LINE.bottom_v(_X)]),
-    )
+    bend, potentials = (np.array([LINE.top_v(_X, order), LINE.bottom_v(_X, order)]) for order in (2, 0))
+    yield ItemPart("d2U/dx2", "V/m2", bend, _MATRIX @ potentials)
 
 
 def eigenvalues() -> Parts:
@@ -83,13 +79,8 @@ def potentials_at_the_end() -> Parts:
 
 def with_exchanged_exponents() -> Parts:
     """B.26: its exponents are exchanged."""
-    yield ItemPart(
-        "U1(x)",
-        "V",
-        LINE.top_v(_X),
-        INPUT_V / 2 + (INPUT_V / 2 - _b4()) * np.exp(K * _X) + _b4() * np.exp(-K * _X),
-        INPUT_V / 2 + sum(_waves(_X)),
-    )
+    exchanged = INPUT_V / 2 + (INPUT_V / 2 - _b4()) * np.exp(K * _X) + _b4() * np.exp(-K * _X)
+    yield ItemPart("U1(x)", "V", LINE.top_v(_X), exchanged, INPUT_V / 2 + sum(_waves(_X)))
 
 
 def at_the_contacts() -> Parts:
@@ -111,9 +102,8 @@ def growing() -> Parts:
 
 def fading() -> Parts:
     """B.38."""
-    yield ItemPart(
-        "B3", "V", _apart()[0], (np.sqrt(2) * LINE.input_a * RHO_OHM_M + HW * _ROOT * INPUT_V) / (4 * HW * _ROOT)
-    )
+    printed = (np.sqrt(2) * LINE.input_a * RHO_OHM_M + HW * _ROOT * INPUT_V) / (4 * HW * _ROOT)
+    yield ItemPart("B3", "V", _apart()[0], printed)
 
 
 def first_element() -> Parts:

@@ -17,8 +17,7 @@ from sensorgen.verification.thesis.checks._columns import (
     pile_f_per_m2,
     piles_f,
 )
-from sensorgen.verification.thesis.items import table
-from sensorgen.verification.thesis.verdicts import ItemPart, Parts
+from sensorgen.verification.thesis.items import ItemPart, Parts, table
 
 _CELL = rect.Params(dielectric_mm=FILM_MM)
 _AREA_M2 = (_CELL.period_mm * M_PER_MM) ** 2

@@ -5,7 +5,6 @@ What nothing else gives is transcribed: compared with the files of materials, pr
 
 from functools import cache
 from statistics import median
-from typing import Any
 
 import numpy as np
 
@@ -13,15 +12,14 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design import materials, printer
 from sensorgen.design.shapes import reference
-from sensorgen.measure.log import importing as readings
+from sensorgen.measure.log import exchange as readings
 from sensorgen.measure.log.entries import Reading
 from sensorgen.measure.signal.verdicts import Evidence, verdict
 from sensorgen.prediction import rest_state
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.query import TIP_M, TONES_HZ
 from sensorgen.verification.thesis.checks._columns import FILM_MM
-from sensorgen.verification.thesis.items import chapter, table
-from sensorgen.verification.thesis.verdicts import ItemPart, Parts
+from sensorgen.verification.thesis.items import ItemPart, Parts, chapter, table
 
 _UNITS = {"_pa": "Pa", "_kg_m3": "kg/m3", "_c": "°C", "_percent": "%"}  # by the ending of a quantity
 _PRINTER = "diabase-h5"
@@ -188,18 +186,21 @@ def multimeter(rows: int, y_ohm: dict[str, list[float]], z_ohm: dict[str, list[f
     orders = [verdict(Evidence(r.written, r.y_ohm, r.z_ohm)).same_order for r in prints]
     both = [order for order in orders if order is not None]
     by_name = {reading.written: reading for reading in prints}
-    y = {axis: median(r.y_ohm[0] for r in prints if r.iteration == 23 and r.design == f"tri{axis}-d0") for axis in "xy"}
-    ours: dict[str, Any] = {}
-    for axis in "xy":
-        design = designs.make({"shape": "tri", "parameters": {"dielectric_mm": 0.0, "along": axis}})
-        ours[axis] = 1 / sum(1 / r.value for r in rest_state.electrode_resistance(drawn(design)).values())
-    yield ItemPart("R of 23 triY over 23 triX, medians", "", ours["y"] / ours["x"], y["y"] / y["x"], shown=3)
+    ours, readings_ohm = np.divide(_shorted_ohm("y"), _shorted_ohm("x")).tolist()
+    yield ItemPart("R of 23 triY over 23 triX, medians", "", ours, readings_ohm, shown=3)
     yield ItemPart("rows with both readings, and those whose Z is of Y's order or less", "", [len(both), sum(both)])
     yield ItemPart("rows", "", len(prints), rows, copied=True)
     for name, value in y_ohm.items():
         yield ItemPart(f"{name}, Y", "ohm", by_name[name].y_ohm, value, copied=True)
     for name, value in z_ohm.items():
         yield ItemPart(f"{name}, Z", "ohm", by_name[name].z_ohm, value, copied=True)
+
+
+def _shorted_ohm(axis: str) -> tuple[float, float]:
+    """Both electrodes of 23 tri without a film in parallel, by their field, and the median of its readings [ohm]."""
+    design = designs.make({"shape": "tri", "parameters": {"dielectric_mm": 0.0, "along": axis}})
+    ours = 1 / sum(1 / r.value for r in rest_state.electrode_resistance(drawn(design)).values())
+    return ours, median(r.y_ohm[0] for r in _prints() if r.iteration == 23 and r.design == f"tri{axis}-d0")
 
 
 def baked() -> Parts:

@@ -9,8 +9,8 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design.shapes import tri
 from sensorgen.models import columns, fem2d, thesis_cells
+from sensorgen.scene.repetition import cell
 from sensorgen.scene.sections import sections
-from sensorgen.scene.unit_cell import cell
 from sensorgen.solvers.electrostatics.mesh import Cones
 from sensorgen.solvers.electrostatics.plane import Plane
 from sensorgen.solvers.electrostatics.triangles import triangles as cut
@@ -24,7 +24,7 @@ from sensorgen.verification.thesis.checks._columns import (
     pile_f_per_m2,
 )
 from sensorgen.verification.thesis.checks._field import OMEGA
-from sensorgen.verification.thesis.verdicts import ItemPart, Parts
+from sensorgen.verification.thesis.items import ItemPart, Parts
 
 _CELL = tri.Params(dielectric_mm=FILM_MM)
 _DESIGN = designs.make({"shape": "tri", "parameters": {"dielectric_mm": FILM_MM}})
@@ -67,9 +67,8 @@ class _Region:
     def formula(self) -> ItemPart:
         """Our copy of the thesis's formula, as corrected."""
         formula = thesis_cells.under_dielectric_f_per_m if self.hangs else thesis_cells.under_cog_f_per_m
-        return ItemPart(
-            "as kept in thesis_cells", "F/m", formula(_CELL, EPS_R), _logarithm(self, self.beta_m), copied=True
-        )
+        ours, printed = formula(_CELL, EPS_R), _logarithm(self, self.beta_m)
+        return ItemPart("as kept in thesis_cells", "F/m", ours, printed, copied=True)
 
     def reduced(self) -> tuple[float, float]:
         """Slope and start [m] of eps0 eps_x / C' over x, of our columns."""
@@ -124,19 +123,14 @@ def gap() -> Parts:
 
 def voltage() -> Parts:
     """3.12, 3.13: fields by thicknesses add up to the voltage."""
-    yield ItemPart(
-        "V", "V", _VOLT, _SOLID.displacement() * ((_T_M - _Y1_M + _FILM_M) / _DISPLACED + _GAP_M / EPS0_F_PER_M)
-    )
+    printed = _SOLID.displacement() * ((_T_M - _Y1_M + _FILM_M) / _DISPLACED + _GAP_M / EPS0_F_PER_M)
+    yield ItemPart("V", "V", _VOLT, printed)
 
 
 def field_in_air() -> Parts:
     """3.14, 3.15, at 1 V."""
-    yield ItemPart(
-        "E_air",
-        "V/m",
-        _SOLID.displacement() / EPS0_F_PER_M,
-        _VOLT * EPS_R / ((_T_M - _Y1_M) + EPS_R * _GAP_M + _FILM_M),
-    )
+    printed = _VOLT * EPS_R / ((_T_M - _Y1_M) + EPS_R * _GAP_M + _FILM_M)
+    yield ItemPart("E_air", "V/m", _SOLID.displacement() / EPS0_F_PER_M, printed)
 
 
 def displacement() -> Parts:
