@@ -19,7 +19,7 @@ test: $(READY_DEV) ## set up, with slicers, ngspice and Chromium where apt may, 
 	scripts/system-packages --programs
 	scripts/debian13-slicers
 	$(BIN)/python -m pytest -m "kernel and not nightly" tests/geometry $(ARGS) >$(VENV)/kernel.txt 2>&1 & kernel=$$!; \
-		$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS); code=$$?; \
+		$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(ARGS); code=$$?; \
 		wait $$kernel || code=1; cat $(VENV)/kernel.txt; exit $$code
 
 nightly: $(READY_DEV) ## the tests that guard more of the same, kills and attacks among them, then the coverage of intervals; hours
