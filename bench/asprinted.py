@@ -5,6 +5,7 @@ Times are the processor's. Slicers run where they are installed; without them on
 
 import json
 import shutil
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -13,9 +14,10 @@ import matplotlib as mpl
 import numpy as np
 
 mpl.use("Agg")
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from matplotlib import pyplot as plt
-from sensorgen.prediction.as_printed import electrode
 
+from electrode_lines import electrode_lines
 from sensorgen.asprinted.printed import body, gap_mm
 from sensorgen.checks.estimate import RULES
 from sensorgen.design.design import make
@@ -81,7 +83,7 @@ def _read_back(slicer, design):
         made = slicing.sliced([slicing.alone(design)], slicer, Path(folder))
         lines, reading = spent(lambda: paths.read(made.raw, design.machine, "slicer"))
         printed, layering = spent(lambda: body(design, lines, slicer=slicer))
-    top = electrode(design, printed.lines, "top")
+    top = electrode_lines(design, printed.lines, "top")
     _, solving = spent(lambda: traxels.resistance(top, 0.07, 1e-5, (-48.9e-3, 48.9e-3), 3e-6))
     return {
         "slicer": f"{slicer} {made.version}", "design": design.name, "slicing_s": made.seconds, "lines": len(lines),

@@ -111,7 +111,7 @@ def row(name, specimen, model, specimens, known=KNOWN):
     """Means over specimens, and tenth percentiles."""
     rows, seconds, verdicts = [], [], np.zeros(len(Verdict), int)
     for seed in range(specimens):
-        one, other, exact = specimen(model, known, seed)
+        one, other, without = specimen(model, known, seed)
         start = time.process_time()
         posterior = calibrated(model, one) if known else by_rest(model, other.rest, other.rest_noise, other.noise[0])
         middle = time.process_time()
@@ -120,14 +120,14 @@ def row(name, specimen, model, specimens, known=KNOWN):
         verdicts += np.bincount(inverted.verdict, minlength=len(Verdict))
         force, position = inside(inverted, other.presses)
         widths = np.median(np.ptp(inverted.force_90_n, axis=1)), 1e3 * np.median(np.ptp(inverted.position_90_m, axis=1))
-        rows.append([*exact, force.mean(), position.mean(), *widths])
+        rows.append([*without, force.mean(), position.mean(), *widths])
     ok, force0, position0, force, position, wide_n, wide_mm = np.mean(rows, axis=0)
     by_specimen = np.array(rows)[:, 3:5].T
     tenth = np.percentile(np.array(rows)[:, 3:5], 10, axis=0)
     print(name, known, np.round([force, position, *tenth], 3), flush=True)
-    exact = "- | -" if np.isnan(ok) else f"{ok:.0%} | {force0:.0%} / {position0:.0%}"
+    uncalibrated = "- | -" if np.isnan(ok) else f"{ok:.0%} | {force0:.0%} / {position0:.0%}"
     return (
-        f"| {name} | {specimens} | {known} | {exact} | "
+        f"| {name} | {specimens} | {known} | {uncalibrated} | "
         f"{' / '.join(told(shares, UNKNOWN) for shares in by_specimen)} | "
         f"{tenth[0]:.2f} / {tenth[1]:.2f} | {wide_n:.2f} N | {wide_mm:.0f} mm | "
         f"{verdicts[Verdict.NO_FIT] / verdicts.sum():.1%} |"

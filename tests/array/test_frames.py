@@ -135,13 +135,17 @@ def test_what_is_not_read_is_not_no_pressure(model):
     assert static.png(plots.figure(broken, PRESSURE))[:4] == b"\x89PNG"
 
 
+TWO_TRACKS = (["c3:0", "r2:3"], ["c5:0", "c6:0"], ["c3:2", "r5:1"], ["r4:0", "c2:1"])
+
+
 @pytest.mark.parametrize(
-    ("faults", "columns_turned"),
-    [(["r2:4"], False), (["r4:0"], False), (["c3:2", "r5:1"], False), (["r1:3", "c2:1"], True)],
-)
-def test_a_track_is_broken_where_its_crossings_are_dead_to_the_end(model, faults, columns_turned):
+    ("faults", "turned"), [(["r2:4"], False), (["r4:0"], False), *((pair, False) for pair in TWO_TRACKS),
+                           (["r1:3", "c2:1"], True), (["r5:2", "r3:1"], True)],
+)  # fmt: skip
+def test_a_track_is_broken_where_its_crossings_are_dead_to_the_end(model, faults, turned):
+    """And nothing else is, though the crossings of two dead tracks end all those across them."""
     tracks = model.tracks()
-    if columns_turned:  # leads at the other end
+    if turned:  # leads at the other end
         tracks = replace(tracks, row_end=0 * tracks.row_end, column_end=0 * tracks.column_end)
     true = faulty(tracks, faults, model.here)
     dead = np.abs(readings(true, 1e3).siemens) < np.abs(readings(tracks, 1e3).siemens) / 3
@@ -151,14 +155,37 @@ def test_a_track_is_broken_where_its_crossings_are_dead_to_the_end(model, faults
         assert np.array_equal(getattr(known, name), getattr(true, name)), name
 
 
+def read_with(model, faults, readout):
+    """Three frames at rest and those of ``PRESSURE`` with faults, by the matrix of all nodes, without noise."""
+    rest = model.capacitances(1 + 0.1 * np.random.default_rng(2).normal(size=(5, 6)))
+    ratios = [np.ones((5, 6))] * 3 + [model.under(p)[0] for p in PRESSURE]
+    network = faulty(model.tracks(), faults, model.here)
+    return np.array([nodal(network, rest * ratio, readout) for ratio in ratios])
+
+
+@pytest.mark.parametrize(
+    ("faults", "lost"), [*((pair, None) for pair in TWO_TRACKS), (["c5:1", "c6:1", "r3c2"], None), (["r2:3"], 3)]
+)
+def test_what_faults_leave_is_right(model, faults, lost):
+    """To 1 kPa at a noise by which the network inverts; faults are named, and crossings of no fault are determined."""
+    readout = ArrayReadout(frequency_hz=(1e4,), noise=1e-4)
+    left = maps(model, readout, read_with(model, faults, readout))
+    assert set(left.faults) == set(faults)
+    assert np.nanmax(np.abs(left.pressure_kpa - PRESSURE / 1e3)) < 1
+    if lost:
+        assert np.isnan(left.pressure_kpa[0]).sum() == lost
+
+
+@pytest.mark.parametrize("fault", ["c3:0", "r2:3"])
+def test_two_terminals_keep_what_a_broken_track_leaves(model, fault):
+    readout = ArrayReadout("two-terminal", 50.0, (1e4,), 1e-3)
+    assert np.isfinite(maps(model, readout, read_with(model, [fault], readout)).pressure_kpa).any()
+
+
 def test_beside_a_short_the_loose_part_of_a_broken_row_mixes_crossings_that_are_not_determined(model):
     """Row 2 is broken behind column 3, row 4 shorted in column 5; all that a map has is right to 1 kPa."""
     readout = ArrayReadout(frequency_hz=(1e3,), noise=1e-5)
-    fault = faulty(model.tracks(), ["r2:3", "r4c5"], model.here)
-    rest = model.capacitances(1 + 0.1 * np.random.default_rng(2).normal(size=(5, 6)))
-    ratios = [np.ones((5, 6))] * 3 + [model.under(p)[0] for p in PRESSURE]
-    solved = [nodal(fault, rest * ratio, readout) for ratio in ratios]
-    mixed = maps(model, readout, np.array(solved))
+    mixed = maps(model, readout, read_with(model, ["r2:3", "r4c5"], readout))
     lost = np.zeros((5, 6), bool)
     lost[1, 3:] = lost[3, 3:] = True
     assert (np.isnan(mixed.pressure_kpa) == lost).all()

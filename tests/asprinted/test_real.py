@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from electrode_lines import electrode_lines
 from sensorgen.asprinted.beads import beads, layers
 from sensorgen.asprinted.printed import body, cell, gap_mm, nominal, window
 from sensorgen.checks.review import review
@@ -16,7 +17,6 @@ from sensorgen.prediction.bodies import sliced
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.scene.layers import drawn
 from sensorgen.scene.scene import area_mm2
-from sensorgen.solvers.network import StraightLines
 
 from .conftest import small
 
@@ -224,17 +224,6 @@ def test_an_unknown_convention(real):
     variant, lines, _ = real()
     with pytest.raises(UnknownName, match="vol"):
         layers(variant, beads(variant, lines), "volume")
-
-
-def electrode_lines(design, lines, end):
-    """The extruded lines of one electrode as a network, its middle at the origin: for studies of contact resistance."""
-    mine = [k for k, body in enumerate(design.printed.bodies) if body.terminal == end]
-    found = lines.of(np.isin(lines.body, mine))
-    middle = np.array(design.printed.size_mm[:2]) / 2
-    start, stop = ((p - middle) * 1e-3 for p in (found.start_mm, found.end_mm))
-    meets = np.append(False, (np.abs(start[1:] - stop[:-1]) < 1e-7).all(1))
-    meets[1:] &= found.layer[1:] == found.layer[:-1]
-    return StraightLines(start, stop, found.width_mm * 1e-3, found.height_mm * 1e-3, found.layer, meets)
 
 
 @pytest.mark.parametrize("degrees", [pytest.param("0", marks=pytest.mark.nightly), "90"])

@@ -62,7 +62,7 @@ class PressureMaps:
     calibration : ArrayCalibration or None
         That gave the pressures; its errors are in the standard errors.
     faults : tuple of str
-        Breaks and shorts that the readings at rest show, as in :func:`faulty`.
+        Breaks and shorts that the readings at rest show, as in :func:`readout.faulty`.
     """
 
     model: ArrayModel
@@ -336,7 +336,10 @@ class MapInverter:
 
     @cached_property
     def _tracks(self) -> Tracks:
-        return broken_where_dead(self.model.tracks(), self.model.here, self._over_nominal < 1 / _ALIVE)
+        tracks = self.model.tracks()
+        if self.readout.kind != "guarded":  # by two terminals a loose track mixes all readings: none would be left
+            return tracks
+        return broken_where_dead(tracks, self.model.here, self._over_nominal < 1 / _ALIVE)
 
     @cached_property
     def _over_nominal(self) -> Real:
@@ -359,9 +362,9 @@ class MapInverter:
             leaks[shorted] = 1 / np.maximum(ohm, 1e-3 / leaks[shorted])
         return leaks
 
-    @property
+    @cached_property
     def faults(self) -> tuple[str, ...]:
-        """Breaks and shorts that the readings at rest show, as in :func:`faulty`."""
+        """Breaks, if guarded, and shorts that the readings at rest show, as in :func:`readout.faulty`."""
         whole, read = self.model.tracks(), self._tracks
         words = [f"r{i + 1}c{j + 1}" for i, j in np.argwhere(self.leaks_s > 0).tolist()]
         for letter, side in (("r", "row"), ("c", "column")):
@@ -376,8 +379,8 @@ class MapInverter:
 
     @cached_property
     def parts(self) -> tuple[Mask, Mask]:
-        """Parts of the readings that count, real and imaginary, (m, n) each: of crossings that are alive."""
-        return np.isfinite(self.rest_s.real) & self.alive, self.alive
+        """Parts of the readings that count, real and imaginary, (m, n) each: of crossings that read their own."""
+        return np.isfinite(self.rest_s.real) & self.own, self.own
 
     @cached_property
     def nominal(self) -> CrossingReadings:
@@ -436,7 +439,15 @@ class MapInverter:
     @cached_property
     def gain(self) -> tuple[Real, Real]:
         """Capacitances by weighed readings, (m n, 2 m n) or of each crossing alone, and their variances [F2]."""
-        real, imaginary = self.parts
+        return self._open if (self.own == self.alive).all() else self._gain(self.own)
+
+    @cached_property
+    def _open(self) -> tuple[Real, Real]:
+        """The same by the readings of all crossings that are alive."""
+        return self._gain(self.alive)
+
+    def _gain(self, counted: Mask) -> tuple[Real, Real]:
+        real, imaginary = np.isfinite(self.rest_s.real) & counted, counted
         weight = np.concatenate([part.ravel() for part in self._weights(real, imaginary)])
         working = self.read(self.model.capacitances())
         if self.model.here.size > MOST_DENSE:
@@ -490,11 +501,11 @@ class MapInverter:
 
         Beside a short, the loose part of a broken track mixes what crosses it.
         """
-        if self.model.here.size > MOST_DENSE:
+        if self.model.here.size > MOST_DENSE or self.readout.kind != "guarded":
             return self.alive
         slopes = own_slopes(self.read(self.model.capacitances()))
         alone = self.readout.sigma_s(self.nominal.siemens) / np.maximum(np.abs(slopes), 1e-30)
-        return self.alive & (self.gain[1].reshape(alone.shape) < (_MIXED * alone) ** 2)
+        return self.alive & (self._open[1].reshape(alone.shape) < (_MIXED * alone) ** 2)
 
     def by_ratio(self, siemens: Complex) -> Real:
         """Capacitance over that at rest, of each crossing by its own reading alone [-]."""

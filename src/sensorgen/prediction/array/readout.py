@@ -1,7 +1,7 @@
 """Readout of an array: noise, information of its readings on every crossing, frames per second, faults."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -164,11 +164,27 @@ def _with_fault(tracks: Tracks, word: str, here: Mask) -> Tracks:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _LooseEnd:
+    """Crossings from some place to an end of a track, all dead: of ``side``, ``track``, broken after ``after``."""
+
+    side: Literal["row", "column"]
+    track: int
+    after: int
+    lost: Mask
+    """(m, n): the crossings."""
+
+    def rank(self, unexplained: Mask) -> tuple[bool, int]:
+        """Number of dead crossings that it explains; whole tracks before parts of others."""
+        count = int((self.lost & unexplained).sum())
+        return (self.after < 0 and count >= _LOOSE), count
+
+
 def broken_where_dead(tracks: Tracks, here: Mask, dead: Mask) -> Tracks:
     """A network whose tracks are broken where all crossings from some place to an end of a track are dead.
 
-    The loose part still joins what crosses it: beside a short, crossings read each other's loads through it. Of a
-    single dead crossing nothing is joined.
+    The loose part still joins what crosses it: beside a short, crossings read each other's loads through it. Crossings
+    that one break explains count for no other; of a single dead crossing nothing is joined.
 
     Parameters
     ----------
@@ -177,21 +193,39 @@ def broken_where_dead(tracks: Tracks, here: Mask, dead: Mask) -> Tracks:
     here, dead : (m, n) array of bool
         Crossings of the array, and those that read nothing.
     """
-    sides: tuple[tuple[Literal["row", "column"], Mask, Mask, Whole], ...] = (
-        ("row", here, dead, tracks.row_end), ("column", here.T, dead.T, tracks.column_end)
-    )  # fmt: skip
-    for side, of, off, ends in sides:
-        for track in np.flatnonzero((of & off).sum(1) >= _LOOSE).tolist():
-            at, end = np.flatnonzero(of[track]), int(ends[track])
+    unexplained = here & dead
+    while True:
+        ends = [*_loose_ends(tracks, here, dead, unexplained)]
+        most = max(ends, key=lambda end: end.rank(unexplained), default=None)
+        if most is None or most.rank(unexplained)[1] < _LOOSE:
+            return tracks
+        tracks = tracks.broken(most.side, most.track, most.after)
+        unexplained = unexplained & ~most.lost
+
+
+def _loose_ends(tracks: Tracks, here: Mask, dead: Mask, unexplained: Mask) -> Iterator[_LooseEnd]:
+    """Loose ends of all tracks, each from its first crossing on that nothing explains yet."""
+    sides: tuple[tuple[Literal["row", "column"], Mask, Mask, Mask, Whole], ...] = (
+        ("row", here, dead, unexplained, tracks.row_end),
+        ("column", here.T, dead.T, unexplained.T, tracks.column_end),
+    )
+    for side, of, off, left, leads in sides:
+        for track in np.flatnonzero(left.any(1)).tolist():
+            at, lead = np.flatnonzero(of[track]), int(leads[track])
             if off[track, at].all():
-                tracks = tracks.broken(side, track, -1)
-                continue
-            for out, before in ((at[at > end], 1), (at[at < end][::-1], 0)):
-                alive = np.flatnonzero(~off[track, out])
-                loose = out[alive[-1] + 1 if alive.size else 0 :]
-                if loose.size >= _LOOSE:
-                    tracks = tracks.broken(side, track, int(loose[0]) - before)
-    return tracks
+                parts = [(at, -1)]
+            else:
+                parts = []
+                for out, before in ((at[at > lead], 1), (at[at < lead][::-1], 0)):
+                    alive = np.flatnonzero(~off[track, out])
+                    tail = out[alive[-1] + 1 if alive.size else 0 :]
+                    if left[track, tail].any():
+                        tail = tail[left[track, tail].argmax() :]
+                        parts.append((tail, int(tail[0]) - before))
+            for crossings, after in parts:
+                lost = np.zeros(of.shape, bool)
+                lost[track, crossings] = True
+                yield _LooseEnd(side, track, after, lost if side == "row" else lost.T)
 
 
 def _stretches(tracks: Tracks) -> int:

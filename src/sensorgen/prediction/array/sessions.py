@@ -275,7 +275,8 @@ def calibrated(sessions: Sequence[ArraySession], form: "LawForm | None" = None) 
         for k, session in enumerate(sessions)
     ]
     off_pairs, mean_pairs = np.sum([pairs for *_, pairs in errors], 0).tolist()
-    common = float(np.sqrt(max(off_pairs, 0.0) / (mean_pairs or 1.0) * (1 + 1 / len(sessions))))  # of one session more
+    share = off_pairs / mean_pairs if mean_pairs > 0 else 0.0
+    common = float(np.sqrt(max(share, 0.0) * (1 + 1 / len(sessions))))  # of one session more
     off, mean, sigma = (np.concatenate(each) for each in list(zip(*errors, strict=True))[:3])
     names = sessions[0].names
     if not off.size:  # total forces alone: the parameters' covariance is what is known
@@ -296,10 +297,15 @@ def _residuals(session: ArraySession, law: ElementLaw) -> tuple[Real, Real, Real
     with np.errstate(invalid="ignore"):
         known = (size > UNLOADED * np.nanmax(size, initial=0.0)) & np.isfinite(mean)
     step = max(1, len(mean) // _FRAMES)
-    every = np.stack([np.where(known, of, 0.0) for of in (mean - session.pressure_kpa, mean)])
-    pairs = (every.sum(2) ** 2 - (every**2).sum(2)).sum(1)
+    off = np.where(known, mean - session.pressure_kpa, 0.0)
+    pairs = np.array([_pairs(of) for of in (off, np.where(known, mean, 0.0))])
     known = known[::step]
-    return every[0, ::step][known], mean[::step][known], sigma[::step][known], pairs
+    return off[::step][known], mean[::step][known], sigma[::step][known], pairs
+
+
+def _pairs(values: Real) -> float:
+    """Sum over rows of the products of two different columns."""
+    return float((values.sum(1) ** 2).sum() - np.einsum("kn,kn->", values, values))
 
 
 def _scale(squares: Real, mean: Real) -> tuple[float, float]:
