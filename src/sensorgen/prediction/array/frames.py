@@ -443,7 +443,7 @@ class MapInverter:
 
     @cached_property
     def _open(self) -> tuple[Real, Real]:
-        """The same by the readings of all crossings that are alive."""
+        """Gain by the readings of all crossings that are alive."""
         return self._gain(self.alive)
 
     def _gain(self, counted: Mask) -> tuple[Real, Real]:
