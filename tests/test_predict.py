@@ -213,7 +213,7 @@ def test_ranges_hold_what_each_way_to_print_gives_by_itself():
         assert bounds.print.upper >= max(values) / 1.1, name
     assert max(one.sensitivity.value for one in alone) > 20 * found.sensitivity.value
     budget = {term.name: term for term in found.budget.terms}
-    assert budget["print"].changes.magnitude > 0.6  # 0.57 by the capacitance alone
+    assert budget["slicer's walls"].changes.magnitude > 0.6  # 0.57 by the capacitance alone
 
 
 def test_a_cell_that_was_not_solved_has_no_known_error():
