@@ -74,7 +74,7 @@ Elements flicker where a fiftieth of their samples or more jump to another value
 
 A state of 100 s was found on these recordings by leaving one out: that column is not independent of what it is tested
 on. The law that the others choose is. In the last table nothing of the recording that is left out is used but its
-first unloaded 20 s."""
+first unloaded 20 s, and the offset of its reference."""
 
 
 def fetch(folder):

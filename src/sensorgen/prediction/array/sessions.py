@@ -278,11 +278,13 @@ def calibrated(sessions: Sequence[ArraySession], form: "LawForm | None" = None) 
     share = off_pairs / mean_pairs if mean_pairs > 0 else 0.0
     common = float(np.sqrt(max(share, 0.0) * (1 + 1 / len(sessions))))  # of one session more
     off, mean, sigma = (np.concatenate(each) for each in list(zip(*errors, strict=True))[:3])
+    alike = np.concatenate([np.full(len(off), 1 / max(len(off), 1)) for off, *_ in errors])  # each session counts alike
     names = sessions[0].names
     if not off.size:  # total forces alone: the parameters' covariance is what is known
         return ArrayCalibration(law, 0.0, 0.0, NORMAL_90, common, tares, quiet, names)
     floor, share = _scale(np.maximum(off**2 - sigma**2, 0.1 * off**2), mean)
-    reach = float(np.quantile(np.abs(off) / np.sqrt(sigma**2 + floor**2 + (share * mean) ** 2), LEVEL))
+    size = np.abs(off) / np.sqrt(sigma**2 + floor**2 + (share * mean) ** 2)
+    reach = float(np.quantile(size, LEVEL, weights=alike, method="inverted_cdf"))
     return ArrayCalibration(law, floor, share, reach, common, tares, quiet, names)
 
 
