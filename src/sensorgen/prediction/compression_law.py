@@ -23,20 +23,9 @@ from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.design.values import MaterialValue, film, material_value, of_all_materials, permittivities
 from sensorgen.models import compression
 from sensorgen.models.compression import CapacitanceCurve, Compression, curve_of, extended
+from sensorgen.prediction import mesh_ladder
 from sensorgen.prediction.capacitance import Answer, is_plate
-from sensorgen.prediction.mesh_ladder import (
-    COARSEST,
-    USUAL,
-    Case,
-    MeshLevel,
-    PressedPiece,
-    coarsest,
-    drawn,
-    estimated,
-    mesh_levels,
-    model_of,
-    pressed,
-)
+from sensorgen.prediction.mesh_ladder import Case, PressedPiece, drawn, pressed
 from sensorgen.prediction.query import FLAT, LAWS
 from sensorgen.scene.scene import Body, Point, Scene, box
 from sensorgen.scene.sections import sections
@@ -192,7 +181,7 @@ def options(
     known = LawOption(at_once.compression.name, 0.0, at_once, lambda: at_once)
     if at_once.bounded or name == "unconfined":
         return [known]
-    model = model_of(piece, quick=not asked)
+    model = mesh_ladder.model_of(piece, quick=not asked)
     meshes = [
         LawOption(
             mesh.name,
@@ -200,12 +189,12 @@ def options(
             _cell(expected(design, mesh), moduli),
             partial(solved, design, printed, mesh.level, model=model, tip=tip, until_pa=until_pa),
         )
-        for mesh in mesh_levels(piece, model, len(stresses_pa(until_pa)) - 1)
+        for mesh in mesh_ladder.mesh_levels(piece, model, len(stresses_pa(until_pa)) - 1)
     ]
     return meshes if asked else [known, *meshes]
 
 
-def expected(design: Design, mesh: MeshLevel) -> CapacitanceCurve:
+def expected(design: Design, mesh: mesh_ladder.MeshLevel) -> CapacitanceCurve:
     """Estimate of an unknown cell's curve on a mesh: that of the prototype that it resembles."""
     modulus_pa = of_all_materials(design, "youngs_modulus_pa")[film(design)].value
     scale = max(modulus_pa / compression.PROTOTYPE_PA, 1 / compression.REACH)  # softer ones could not be extrapolated
@@ -229,7 +218,7 @@ def nearest(design: Design, piece: PressedPiece, answer: Answer, until_pa: float
     from sensorgen.models import closed
     from sensorgen.models.press2d import BoundaryConditions
 
-    like = expected(design, mesh_levels(piece, "press3d", 1)[0])
+    like = expected(design, mesh_ladder.mesh_levels(piece, "press3d", 1)[0])
     law, last_pa = _cell(like, of_all_materials(design, "youngs_modulus_pa")), like.stress_pa[-1]
     if until_pa <= compression.REACH * last_pa:
         return replace(law, bounded=False)
@@ -436,7 +425,7 @@ def stresses_pa(until_pa: float) -> tuple[float, ...]:
 def solved(
     design: Design,
     printed: PressedPiece | None = None,
-    level: int = USUAL,
+    level: int = mesh_ladder.USUAL,
     boundary: "BoundaryConditions | None" = None,
     model: str = "",
     *,
@@ -469,10 +458,10 @@ def solved(
     """
     moduli, ratios = of_all_materials(design, "youngs_modulus_pa"), of_all_materials(design, "poisson_ratio")
     piece = printed or drawn(design)
-    model = model or model_of(piece)
+    model = model or mesh_ladder.model_of(piece)
     loads = stresses_pa(until_pa)
     case = _case(design, piece, model, boundary) if boundary else case_of(design, piece, model, tip)
-    estimate = estimated(case, loads, level, sound=True)
+    estimate = mesh_ladder.estimated(case, loads, level, sound=True)
     solution = estimate.found
     if solution.converged_pa < _ENOUGH * STRESS_PA[-1]:
         solution = pressed(case, loads, level)
@@ -560,7 +549,7 @@ def under_tops(
     own : CapacitanceCurve
         Under the tip.
     """
-    loads, level = [own.stress_pa[-1] * share for share in _COARSE], coarsest(model)
+    loads, level = [own.stress_pa[-1] * share for share in _COARSE], mesh_ladder.coarsest(model)
 
     def rise(block: str) -> Real:
         try:
@@ -595,7 +584,7 @@ def _few_pa(stress_pa: float, tip: Tip) -> Real:
 
 def at_a_few_pressures(
     design: Design, printed: PressedPiece, answer: Answer, stress_pa: float, name: str = "", *, tip: Tip = FLAT,
-    level: int = COARSEST,
+    level: int = mesh_ladder.COARSEST,
 ) -> Law | None:  # fmt: skip
     """The stored law of a printed cell; else a section or round cell solved at a few pressures on the coarsest mesh.
 
@@ -626,7 +615,7 @@ def at_a_few_pressures(
     known = law_of(design, answer, name, printed=printed, tip=tip, until_pa=stress_pa)
     if known.bounded:
         return known
-    model = model_of(printed, quick=True)
+    model = mesh_ladder.model_of(printed, quick=True)
     if model == "press3d":
         law = infill(design, printed) or nearest(design, printed, answer, stress_pa)
         return law if law.bounded else None
