@@ -446,7 +446,7 @@ def _resolution(result: Prediction, model: SensorModel, load: Load, query: Query
     by_law = [errors(replace(model.sensor, compression=other)) for other in law.others] if law.bounded else [(nan, nan)]
     by_print = [[errors(sensor) for sensor in sensors] for sensors in others]
     values = list(material_ends(model, ReferenceLoad(model.sensor, load)))
-    by_value = [[errors(sensor) for sensor in ends.sensors] for ends in values]
+    by_value = [[errors(sensor) for sensor in ends.sensors or ()] for ends in values]
 
     def of(which: int, unit: str) -> tuple[Bounds | None, dict[str, Interval]]:
         value = own[which]
