@@ -253,7 +253,8 @@ def _array(
 
     if bool(port) == simulate:
         raise BadInput(f"{'both' if port else 'neither'} of --port and --simulate; expected one of them")
-    _refuse_times(seconds, unloaded_s)
+    if not (seconds > 0 and 0 <= unloaded_s < inf):
+        raise BadInput(f"--seconds {seconds:g}, --unloaded {unloaded_s:g}; expected seconds above 0, and 0 or more")
     refuse_input(readout)
     model, clock = array_model(design), RealClock()
     first = _first_press(press, model.here.shape)
@@ -263,7 +264,9 @@ def _array(
     with ExitStack() as stack:
         stack.callback(meter.close)
         render.say(meter.identify().model, err=True)
-        _refuse_shape(meter, model)
+        if meter.shape != model.here.shape:
+            (m, n), (rows, columns) = meter.shape, model.here.shape
+            raise BadInput(f"frames of {m} x {n}; expected {rows} x {columns}, as of {model.design.name}")
         how = ArrayReadout(readout, input_ohm, (meter.frequency_hz,), noise)  # type: ignore[arg-type]
         live = LiveMaps(model, how, scatter, known(calibration), day)
         file = recorder(record, meter.shape, meter.frequency_hz) if record else None
@@ -301,17 +304,6 @@ def _first_press(crossing: str, shape: tuple[int, int]) -> "NamedPress | None":
 
     with within("--press"):
         return NamedPress(crossings((crossing,), shape)[crossing]) if crossing else None
-
-
-def _refuse_times(seconds: float, unloaded_s: float) -> None:
-    if not (seconds > 0 and 0 <= unloaded_s < inf):
-        raise BadInput(f"--seconds {seconds:g}, --unloaded {unloaded_s:g}; expected seconds above 0, and 0 or more")
-
-
-def _refuse_shape(meter: "FrameMeter", model: "ArrayModel") -> None:
-    if meter.shape != model.here.shape:
-        (m, n), (rows, columns) = meter.shape, model.here.shape
-        raise BadInput(f"frames of {m} x {n}; expected {rows} x {columns}, as of {model.design.name}")
 
 
 def _device(kind: str, port: str, clock: "Clock") -> "FrameMeter":

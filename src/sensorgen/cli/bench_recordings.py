@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from sensorgen.core.arrays import Complex, Real
     from sensorgen.core.document import Documented
-    from sensorgen.measure.readings import FileRows, Readings
+    from sensorgen.measure.readings import FileRows
     from sensorgen.measure.recording import Recording, RigLog
     from sensorgen.measure.signal.presses import Pairs
     from sensorgen.measure.signal.run import Processed
@@ -359,14 +359,10 @@ def _live(measured: str, *, rate_hz: Rate, cutoff_hz: Cutoff = None) -> None:
 
     smooth = Live(rate_hz, cutoff_hz or CUTOFF_HZ)
     with readings(measured) as source:
-        render.say(_header(source))
+        tones = (units.frequency_text(float(f)) for f in source.frequency_hz)
+        render.say(",".join([*map(_cell, source.kept), *(f"{part}_ohm_{f}" for f in tones for part in ("re", "im"))]))
         for block in source.blocks():
             render.say("".join(_rows(block, smooth(block.impedance_ohm))), nl=False)
-
-
-def _header(source: "Readings") -> str:
-    tones = (units.frequency_text(float(f)) for f in source.frequency_hz)
-    return ",".join([*map(_cell, source.kept), *(f"{part}_ohm_{f}" for f in tones for part in ("re", "im"))])
 
 
 def _rows(block: "FileRows", smooth: "Complex") -> Iterator[str]:

@@ -355,7 +355,10 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
             plan.append(replace(candidate, passed_over=str(error)))
             continue
         bounds[candidate.model] = bound
-        _refuse_contradiction(bounds)
+        for part in zip(*(_parts(bound) for bound in bounds.values()), strict=True):
+            named = {name: bound for name, bound in zip(bounds, part, strict=True) if bound}
+            if named:
+                _refuse_apart(named)
         plan.append(replace(candidate, width=bound.width(), seconds=seconds))
     if not bounds:
         raise Unpredictable(_together(refused))
@@ -384,14 +387,6 @@ def _parts(bound: Interval | Disc) -> tuple[Interval, Interval | None]:
         return bound, None
     real, loss = bound.centre.real, -bound.centre.imag
     return Interval(real - bound.radius, real + bound.radius), Interval(loss - bound.radius, loss + bound.radius)
-
-
-def _refuse_contradiction(bounds: Mapping[str, Interval | Disc]) -> None:
-    """All of them hold the truth: any two overlap."""
-    for part in zip(*(_parts(bound) for bound in bounds.values()), strict=True):
-        named = {name: bound for name, bound in zip(bounds, part, strict=True) if bound}
-        if named:
-            _refuse_apart(named)
 
 
 def _refuse_apart(bounds: Mapping[str, Interval]) -> None:

@@ -124,7 +124,8 @@ def law_of(
         raise OutOfRange(f"{condition}; {design.shape} has gaps: expected 'unconfined' or the sides symmetric")
     stored = None if name in ("unconfined", "infill") else _stored(design, printed)
     if stored and until_pa <= _PAST * stored.stress_pa[-1]:
-        return _stored_law(stored, moduli, tip, usual=_is_usual(design, tip))
+        tops = {EVEN: stored, STIFF: stored.scaled_rise(1 + stored.stiff_change)}
+        return _cell(tops.get(tip.block) or stored.under_block(usual=_is_usual(design, tip)), moduli, tops)
     if name == "solved":
         return solved(design, printed, tip=tip, until_pa=until_pa)
     return _unsolved(design, moduli[film(design)], name, piece)
@@ -404,12 +405,6 @@ def _ends(curve: CapacitanceCurve) -> tuple[CapacitanceCurve, CapacitanceCurve]:
     return least, most
 
 
-def _stored_law(even: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tip: Tip, *, usual: bool) -> Law:
-    """Law of a stored cell, solved under an even pressure, and under the ``usual`` block."""
-    tops = {EVEN: even, STIFF: even.scaled_rise(1 + even.stiff_change)}
-    return _cell(tops.get(tip.block) or even.under_block(usual=usual), moduli, tops)
-
-
 def _is_usual(design: Design, tip: Tip) -> bool:
     """Test whether a tip is the block that stored cells were pressed with, or a higher one."""
     modulus_pa = design.material(Tip.block).value("youngs_modulus_pa").value
@@ -574,14 +569,6 @@ def under_tops(
     return curves
 
 
-def _few_pa(stress_pa: float, tip: Tip) -> Real:
-    """A few pressures up to beyond one, where it is among those of :func:`under_tops` these [Pa]."""
-    last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
-    usual = stresses_pa(stress_pa)[-1] * np.array(_COARSE)
-    is_usual = stress_pa <= last_pa and not tip.soft and stress_pa in usual
-    return usual if is_usual else last_pa * np.array([0.0, 0.4, 0.8, 1.0])
-
-
 def at_a_few_pressures(
     design: Design, printed: PressedPiece, answer: Answer, stress_pa: float, name: str = "", *, tip: Tip = FLAT,
     level: int = mesh_ladder.COARSEST,
@@ -621,7 +608,10 @@ def at_a_few_pressures(
         return law if law.bounded else None
     try:
         case = case_of(design, printed, model, tip)
-        solution = pressed(case, _few_pa(stress_pa, tip).tolist(), level)
+        last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
+        usual = stresses_pa(stress_pa)[-1] * np.array(_COARSE)
+        is_usual = stress_pa <= last_pa and not tip.soft and stress_pa in usual
+        solution = pressed(case, (usual if is_usual else last_pa * np.array([0.0, 0.4, 0.8, 1.0])).tolist(), level)
         curve = curve_of(solution)
     except SensorgenError:
         return None

@@ -209,22 +209,17 @@ def _kind_of(path: Path) -> Kind | Literal[""]:
 
 def _misplaced(pack: Pack) -> Faults:
     """Files that nothing reads: of another ending or name than those of their folder, or in no folder of a kind."""
-    yield from _unread(pack)
+    for kind in packs.SINGULAR:
+        read = {f"{name}{packs.suffix(kind)}" for name in pack.names(kind)} | {"__init__.py"}
+        for path in _listed(pack.place(kind), (".yaml", ".yml", ".py")):
+            if path.name not in read:
+                yield f"{kind}/{path.name}", "nothing reads this file", _where_to(path, kind)
     for folder in _listed(pack.folder):
         near = nearest(folder.name, packs.SINGULAR)
         if near and folder.is_dir() and folder.name not in packs.SINGULAR:
             yield f"{folder.name}/", "nothing reads this folder", f"rename it to {near}"
     if (pack.folder / packs.MANIFEST).exists():  # else a folder with designs, whose files are named by their paths
         yield from _in_no_folder(pack)
-
-
-def _unread(pack: Pack) -> Faults:
-    """Files of another ending or name than those of their folder."""
-    for kind in packs.SINGULAR:
-        read = {f"{name}{packs.suffix(kind)}" for name in pack.names(kind)} | {"__init__.py"}
-        for path in _listed(pack.place(kind), (".yaml", ".yml", ".py")):
-            if path.name not in read:
-                yield f"{kind}/{path.name}", "nothing reads this file", _where_to(path, kind)
 
 
 def _in_no_folder(pack: Pack) -> Faults:
@@ -273,27 +268,17 @@ def _material(file: File) -> Faults:
     for quantity, values in (*material.properties.items(), *material.print.items()):
         if quantity not in known:
             yield "quantity", str(UnknownName("quantity", quantity, known)), "take a name that sensorgen reads"
-        yield from _default(quantity, values)
+        usable = [value.source for value in values if not value.implausible and math.isfinite(value.value)]
+        if usable and not any(value.default for value in values):
+            yield "default", f"{quantity} has no default value", f"add 'default: true' to that of {usable[0]}"
         for value in values:
-            yield from _material_value(quantity, value, cited)
+            if value.source not in cited:
+                where = "say under 'citations' where it is published"
+                yield "source", f"{quantity}: source {value.source!r} is not explained", where
+            if value.default and value.implausible:
+                yield "default", f"{quantity} of {value.source} is implausible and a default", "remove one of them"
     if not material.properties and not material.print:
         yield "values", "no values", "add at least one quantity"
-
-
-def _default(quantity: str, values: Sequence[materials.Value]) -> Faults:
-    """Lack of a default among the values of one quantity."""
-    usable = [value.source for value in values if not value.implausible and math.isfinite(value.value)]
-    if usable and not any(value.default for value in values):
-        yield "default", f"{quantity} has no default value", f"add 'default: true' to that of {usable[0]}"
-
-
-def _material_value(quantity: str, value: materials.Value, cited: set[str]) -> Faults:
-    """Faults of one value."""
-    if value.source not in cited:
-        where = "say under 'citations' where it is published"
-        yield "source", f"{quantity}: source {value.source!r} is not explained", where
-    if value.default and value.implausible:
-        yield "default", f"{quantity} of {value.source} is implausible and a default", "remove one of them"
 
 
 def _program(file: File, text: str) -> Faults:

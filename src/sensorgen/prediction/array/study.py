@@ -294,7 +294,8 @@ def study(
     whole = model.tracks(model.capacitances(float(ratio)))
     read = readout.read(faulty(whole, faults, model.here))
     prior = np.where(model.here, per_pa * FULL_SCALE_PA, 1e-6 * model.capacitance.value).ravel()
-    known = _on_surface(information(read, readout, model.here, readout.read(whole) if faults else None), model)
+    found = information(read, readout, model.here, readout.read(whole) if faults else None)
+    known = (found / model.undone**2) if found.ndim == 1 else (np.asarray(model.spread.T @ found @ model.spread))
     spread = covariance(known, prior)
     variance = spread if spread.ndim == 1 else np.diag(spread)
     sigma = np.sqrt(variance).reshape(model.here.shape) / per_pa / PA_PER_KPA
@@ -303,13 +304,6 @@ def study(
         model, readout, pressure_kpa, np.where(model.here, sigma, np.nan), crosstalk(read[0]) if small else None,
         tuple(faults), distance_mm(model, known * per_pa**2), short,
     )  # fmt: skip
-
-
-def _on_surface(found: Real, model: ArrayModel) -> Real:
-    """Information on pressures on the surface by that on those that cells carry, (k, k), or each alone, (k,)."""
-    if found.ndim == 1:
-        return found / model.undone**2
-    return np.asarray(model.spread.T @ found @ model.spread)
 
 
 def _map(values: Real) -> list[list[float | None]]:

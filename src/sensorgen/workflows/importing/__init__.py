@@ -333,10 +333,14 @@ class Imported:
         """Files written, and what applies to them."""
         size = " x ".join(f"{edge:g}" for edge in self.size_mm)
         moved = ", ".join(f"{way:g}" for way in self.moved_mm)
+        reasons: dict[str, list[str]] = {}
+        for name, reason in self.models.items():
+            reasons.setdefault(reason, []).append(name)
+        why = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
         rows = [
             ("size", f"{size} mm" + (f"; moved by {moved} mm, its corner to 0, 0, 0" if any(self.moved_mm) else "")),
             *self.bodies.items(),
-            ("capacitance as drawn", self._models_as_drawn()),
+            ("capacitance as drawn", ", ".join(reasons.get("", ())) or f"no model applies, only as printed ({why})"),
             ("written", f"{self.design} and {self.geometry}"),
             (
                 "next",
@@ -349,14 +353,6 @@ class Imported:
         if self.findings:
             yield ""
             yield from listed(self.findings)
-
-    def _models_as_drawn(self) -> str:
-        """Models that apply to the drawing, or why none does."""
-        reasons: dict[str, list[str]] = {}
-        for name, reason in self.models.items():
-            reasons.setdefault(reason, []).append(name)
-        why = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
-        return ", ".join(reasons.get("", ())) or f"no model applies, only as printed ({why})"
 
 
 def write(
