@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.core.display import Displayed
+from sensorgen.core.display import Boundless, Displayed
 from sensorgen.core.document import Cell, Column, Part, Table
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.core.units import M_PER_MM, frequency_text, si
@@ -216,7 +216,7 @@ _SHOWN = (
 
 
 @dataclass(frozen=True)
-class PredictedPoint:
+class PredictedPoint(Boundless):
     """A prediction at one value of a sweep.
 
     Attributes
@@ -230,8 +230,6 @@ class PredictedPoint:
     accuracy : float or None
         Of abs(Z), that was asked for [-].
     """
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
     design: str
     reason: str = ""

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cache, partial
 from itertools import product
 from math import inf, isfinite, isnan, nan, pi, prod, tan
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from sensorgen.design.design import Design
 from sensorgen.design.effects import Effects
 from sensorgen.design.tip import WORDS
 from sensorgen.design.values import ASSUMED, ENDS, MaterialValue, assumed, lead_ranges
-from sensorgen.models import line
+from sensorgen.models import line, refusal
 from sensorgen.models.compression import Compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.capacitance import Unpredictable
@@ -161,7 +162,7 @@ def _at_rest(result: Prediction, body: Body, rest: RestState, frequency_hz: tupl
     resistance, c = {end: r.plus(*ohm) for end, r in r_only.items()}, c_only.plus(*farad)
     if set(resistance) != set(ENDS):
         return replace(result, capacitance=c, resistance=resistance)
-    r = _in_series(r_only["top"], r_only["bottom"])
+    r = _of_line(r_only["top"], r_only["bottom"], add, "ohm")
     corner = _of_line(r, c_only, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
     return replace(
         result, capacitance=c, resistance=resistance, corner_frequency=corner,
@@ -178,7 +179,7 @@ def impedance_at(prediction: Prediction, frequency_hz: float, gone: Lost) -> Imp
         return None
     c, ends = prediction.capacitance, [prediction.resistance[end] for end in ENDS]
     leads = _beyond(c), _beyond(ends[0])
-    whole = _in_series(ends[0].alone(), ends[1].alone())
+    whole = _of_line(ends[0].alone(), ends[1].alone(), add, "ohm")
     return _impedance(frequency_hz, whole, c.alone(), gone, leads, Effects().permittivity_dispersion)
 
 
@@ -197,19 +198,8 @@ def _beyond(quantity: Bounds) -> Added:
     return Added(0.0, ends.lower - quantity.value, ends.upper - quantity.value)
 
 
-def _in_series(one: Bounds, other: Bounds) -> Bounds:
-    def added(a: Interval, b: Interval) -> Interval:
-        return Interval(a.lower + b.lower, a.upper + b.upper)
-
-    return Bounds(
-        one.value + other.value, one.lower + other.lower, one.upper + other.upper, "ohm",
-        added(one.model, other.model), added(one.print, other.print), added(one.material, other.material),
-        one.certified and other.certified,
-    )  # fmt: skip
-
-
 def _of_line(r: Bounds, c: Bounds, of: Callable[[float, float], float], unit: str) -> Bounds:
-    """A quantity of the unloaded line: at the ends of what resistance and capacitance may be."""
+    """A quantity of the unloaded line: at the ends of what two others, as resistance and capacitance, may be."""
 
     def ends(ohm: Interval, farad: Interval) -> Interval:
         values = [of(*pair) for pair in product((ohm.lower, ohm.upper), (farad.lower, farad.upper))]
@@ -313,27 +303,22 @@ def _free_sides(body: Body) -> str:
 def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:
     """Sensors by the ways to print it that have the least and the largest capacitance; None where one is not known."""
     body = model.body
-    own = model.sensor.capacitance_f()
-    at_rest: list[tuple[float, Body, RestState]] = [(own, body, model.rest)]
+    at_rest: list[tuple[float, Body, RestState]] = [(model.sensor.capacitance_f(), body, model.rest)]
     for rule in list(body.cells.scenes)[1:]:
         with suppress(SensorgenError):  # as of a short, which the prediction tells by itself
             other = body.printed_otherwise(rule)
             rest = rest_state(other, ranges=False)
             at_rest.append((rest.capacitance.value, other, rest))
-    ends = {id(pick[1]): pick for pick in (_end(at_rest, least=True), _end(at_rest, least=False))}
-    pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
-    for _, other, rest in ends.values():
-        if other is not body:
-            tip = query.tip_of(body.design)
-            law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _closed_form(model), tip=tip)
-            yield build_sensor(other, law, tip, rest=rest).sensor if law else None
+    ends: dict[int, tuple[Body, RestState]] = {}
+    for end in (min, max):
+        value = end(c for c, *_ in at_rest)
+        ends |= next({id(other): (other, rest)} for c, other, rest in at_rest if abs(c / value - 1) < _SAME)
+    yield from (_pressed(*pick, model, load, query) for pick in ends.values() if pick[0] is not body)
 
 
 def _other_films(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:
     """Sensors with the thickest and the thinnest film, and one a layer thinner; None where it is not known so."""
-    body, rest, tip = model.body, model.rest, query.tip_of(model.body.design)
-    film = body.cells.film
-    pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
+    body, rest, film = model.body, model.rest, model.body.cells.film
     films = ((film.thicker, rest.by_film.lower), (film.thinner, rest.by_film.upper),
              (film.layer_thinner, rest.layer_thinner_f)) if film else ()  # fmt: skip
     for scene, farad in films:
@@ -342,20 +327,17 @@ def _other_films(model: SensorModel, load: Load, query: Query) -> Iterator[Senso
             continue
         cells = replace(body.cells, scenes={"film": scene}, film=None)
         other = replace(body, make=lambda cells=cells: cells)  # type: ignore[misc]
-        law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _closed_form(model), tip=tip)
         at_rest = replace(rest, capacitance=replace(rest.capacitance, value=farad))
-        yield build_sensor(other, law, tip, rest=at_rest).sensor if law else None
+        yield _pressed(other, at_rest, model, load, query)
 
 
-def _closed_form(model: SensorModel) -> str:
-    """The law in closed form that was taken, or ""."""
-    return name if (name := model.law.compression.name) in CLOSED_FORM else ""
-
-
-def _end(candidates: list[tuple[float, Body, RestState]], *, least: bool) -> tuple[float, Body, RestState]:
-    """The first with the least or the largest capacitance, to 5 %."""
-    value = (min if least else max)(c for c, _, _ in candidates)
-    return next(pick for pick in candidates if abs(pick[0] / value - 1) < _SAME)
+def _pressed(other: Body, rest: RestState, model: SensorModel, load: Load, query: Query) -> Sensor | None:
+    """Another body's sensor, its law at a few pressures or in the model's closed form; None where it is not known."""
+    tip, name = query.tip_of(other.design), model.law.compression.name
+    pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
+    closed_form = name * (name in CLOSED_FORM)
+    law = at_a_few_pressures(other.design, piece(other), rest.answer, pressure_pa, closed_form, tip=tip)
+    return build_sensor(other, law, tip, rest=rest).sensor if law else None
 
 
 def _with_tops(result: Prediction, model: SensorModel, load: Load, query: Query) -> Prediction:
@@ -414,7 +396,7 @@ def _sensitivity(model: SensorModel, load: Load, query: Query, others: Otherwise
     return Bounds.of(
         value, "1/kPa", model=_span(value, of, model.law.others), material=_span(value, of, moduli),
         print=_compounded(value, by_print),
-        open="upper" if any(_is_beyond(of, law) for law in moduli) else "",
+        open="upper" if any(refusal(OutOfRange, of, law) for law in moduli) else "",
     )  # fmt: skip
 
 
@@ -428,15 +410,6 @@ def _mean_slope(law: Compression, range_pa: tuple[float, float]) -> float:
     """Relative rise of the capacitance between two pressures, over their difference [1/kPa]."""
     low, high = law.capacitive_strain(np.array(range_pa))[0].tolist()
     return float(((1 - low) / (1 - high) - 1) / (range_pa[1] - range_pa[0]) * _PA_PER_KPA)
-
-
-def _is_beyond(of: Callable[[Compression], float], law: Compression) -> bool:
-    """Test whether the pressure is more than a law, of softer material, is known for."""
-    try:
-        of(law)
-    except OutOfRange:
-        return True
-    return False
 
 
 def _resolution(result: Prediction, model: SensorModel, load: Load, query: Query, others: Otherwise) -> Prediction:
@@ -496,11 +469,7 @@ def _range(values: Sequence[float]) -> Interval:
 
 def _span(value: float, of: Callable[[Compression], float], laws: Iterable[Compression]) -> Interval:
     """Lowest and highest over other laws of compression, those left out that the pressure is beyond."""
-    values = [value]
-    for law in laws:
-        with suppress(OutOfRange):
-            values.append(of(law))
-    return Interval(min(values), max(values))
+    return _range([value, *(of(law) for law in laws if refusal(OutOfRange, of, law) is None)])
 
 
 def _moduli(model: SensorModel) -> list[Compression]:

@@ -3,15 +3,15 @@
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, field, replace
-from functools import cache
 from math import inf, nan
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, Literal
 
 from sensorgen.core.bounds import Bounds, Interval
-from sensorgen.core.display import Displayed
+from sensorgen.core.display import Boundless, Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
+from sensorgen.core.records import adapter
 from sensorgen.core.units import si
 from sensorgen.design.values import ASSUMED, ENDS, MaterialValue
 from sensorgen.prediction.identifiability.results import (
@@ -25,9 +25,6 @@ from sensorgen.prediction.identifiability.results import (
     of_schema_1,
 )  # fmt: skip
 from sensorgen.prediction.plan import Plan, without_times
-
-if TYPE_CHECKING:
-    from pydantic import TypeAdapter
 
 _SHORT = 60  # characters that say what an assumption is, on a first screen
 _LEAST_PERCENT = 0.005  # change of a value that is not rounding
@@ -306,7 +303,7 @@ class UnderTop:
 
 
 @dataclass(frozen=True)
-class Prediction(Displayed):
+class Prediction(Boundless, Displayed):
     """Prediction of a sensor's readings.
 
     Attributes
@@ -358,8 +355,6 @@ class Prediction(Displayed):
     narrowing : tuple of Narrowing
         What narrows ranges that span a factor above 3.
     """
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
     schema: int
     design: str
@@ -646,17 +641,9 @@ def _change(part: Interval, value: float) -> str:
     return " to ".join(f"{float(f'{c:.2g}'):+g}" if abs(c) >= _LEAST_PERCENT else "0" for c in changes) + " %"
 
 
-@cache
-def adapter() -> "TypeAdapter[Prediction]":
-    """Conversion of a prediction to JSON and back, and its schema."""
-    from pydantic import TypeAdapter
-
-    return TypeAdapter(Prediction)
-
-
 def to_json(prediction: Prediction) -> str:
     """A prediction as JSON, the same for the same prediction: without run times; infinities are "Infinity"."""
-    return adapter().dump_json(timeless(prediction)).decode()
+    return adapter(Prediction).dump_json(timeless(prediction)).decode()
 
 
 def timeless(prediction: Prediction) -> Prediction:
@@ -677,11 +664,13 @@ def from_json(text: str) -> Prediction:
         data = json.loads(text)
         if isinstance(data, dict) and "schema" not in data:
             return _of_schema_1(data)
-        if isinstance(data, dict) and data["schema"] == 2:
-            return adapter().validate_python(_of_schema_2(data), strict=False)
-        if isinstance(data, dict) and data["schema"] not in (3, SCHEMA):
+        if isinstance(data, dict) and data["schema"] not in (2, 3, SCHEMA):
             raise BadInput(f"a prediction of schema {data['schema']}; this version reads {SCHEMA} and older: update")
-        return adapter().validate_json(text)
+        known, old = adapter(Prediction), isinstance(data, dict) and data["schema"] == 2
+        found: Prediction = (
+            known.validate_python(_of_schema_2(data), strict=False) if old else known.validate_json(text)
+        )
+        return found
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
         raise BadInput(f"not a prediction: {str(error).partition(chr(10))[0]:.200}") from None
 

@@ -8,12 +8,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from sensorgen.checks.review import Step, draw, report
 from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.cache import Unknown, only_known
+from sensorgen.core.display import Boundless
 from sensorgen.core.document import Part
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.findings import Finding, headline, listed, most_severe
@@ -40,7 +41,7 @@ STEPS = ("meshes", "checks", "validity", "prediction", "3MF", "profiles", "drawi
 
 
 @dataclass(frozen=True)
-class Built:
+class Built(Boundless):
     """Results of a build.
 
     Attributes
@@ -70,8 +71,6 @@ class Built:
     compared : str
         Effect of the compensation on the resolutions.
     """
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
     name: str
     folder: Path

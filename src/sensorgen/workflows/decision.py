@@ -6,11 +6,12 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from sensorgen.checks.review import STEPS as CHECKS
 from sensorgen.checks.review import CheckReport, Review, Step, report
 from sensorgen.core.cache import Unknown, only_known
+from sensorgen.core.display import Boundless
 from sensorgen.core.document import Part
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Refused, headline, listed
@@ -30,7 +31,7 @@ STEPS = ("prediction", "changes", "done")
 
 
 @dataclass(frozen=True)
-class Decision(CheckReport):
+class Decision(Boundless, CheckReport):
     """The findings about a print, and what follows from them.
 
     Attributes
@@ -42,8 +43,6 @@ class Decision(CheckReport):
     advice : Advice or None
         Changes that were tried; None where none was looked for.
     """
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
     trial: Trial | None = None
     reason: str = ""
@@ -77,10 +76,8 @@ class Decision(CheckReport):
 
 
 @dataclass(frozen=True)
-class RefusedBuild(Refused):
+class RefusedBuild(Boundless, Refused):
     """A design that is not built because of findings, with changes that were tried."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
     advice: Advice | None = None
 

@@ -5,6 +5,7 @@ independent. Divided by Z a reading is then ln Z with noise ``noise`` in both pa
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import OutOfRange
+from sensorgen.models import refusal
 from sensorgen.models.sensor import Response, Sensor
 from sensorgen.prediction.identifiability import results
 from sensorgen.prediction.identifiability.results import GUESS, finite, metres, newtons
@@ -156,18 +158,11 @@ def undefined(setup: Setup, of: Slopes) -> str:
 
 def bearable(sensor: Sensor, force_n: Real, position_m: Real) -> Mask:
     """Where the law of compression is defined, in the broadcast shape of forces [N] and positions [m]."""
-
-    def defined(stress_pa: Real) -> bool:
-        try:
-            sensor.compression.capacitive_strain(stress_pa)
-        except OutOfRange:
-            return False
-        return True
-
     stress = sensor.stress_pa(force_n, position_m)
-    if defined(stress):
+    refused = partial(refusal, OutOfRange, sensor.compression.capacitive_strain)
+    if refused(stress) is None:
         return np.ones(stress.shape, bool)
-    return np.array([defined(np.asarray(one)) for one in stress.ravel()]).reshape(stress.shape)
+    return np.array([refused(np.asarray(one)) is None for one in stress.ravel()]).reshape(stress.shape)
 
 
 def standard_errors(limits: LeastErrors) -> results.StandardErrors:
