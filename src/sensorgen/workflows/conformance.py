@@ -25,7 +25,6 @@ from sensorgen.scene.scene import Envelope, Fill, Scene
 
 _SMALL = {"length_mm": 12.0, "width_mm": 5.0}  # of a test's sensor, where the shape's ranges hold it
 _IMPORTS = ("sensorgen.scene", "sensorgen.core.errors")
-_NEEDED = {True: ("resistivity_ohm_m",), False: ("relative_permittivity", "youngs_modulus_pa", "poisson_ratio")}
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 Step = Callable[[str], None]
 

@@ -11,7 +11,6 @@ from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, no
 from sensorgen.prediction.inference import LocalFit, Normal, parts, whitening
 
 ROUNDS = 3  # Gauss-Newton and variance components in turn
-_FARTHEST = 8.0  # standard deviations: beyond, readings that no specimen gives lead to numbers that no line takes
 NOISE = 1e-3  # of the parts of a ratio, where no press tells
 _FEWEST_COURSES = 10  # presses from which on their usual course is known
 _FLOOR = 1e-5  # of ln Z: no bench is right to more
