@@ -15,7 +15,7 @@ from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.cache import Unknown, only_known
 from sensorgen.core.display import Boundless
-from sensorgen.core.document import Part
+from sensorgen.core.document import Part, apart
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.findings import Finding, headline, listed, most_severe
 from sensorgen.core.version import __version__
@@ -89,12 +89,8 @@ class Built(Boundless):
         """Verdict, quantities drawn beside printed, and the three findings that matter most."""
         yield from self._head()
         yield from table(self.trial) if self.trial else self.prediction.summary()
-        if shown := most_severe(self.findings, 3):
-            yield ""
-            yield from listed(shown)
-        if self.advice:
-            yield ""
-            yield from self.advice.document()
+        advice = self.advice.document() if self.advice else ()
+        yield from apart(listed(most_severe(self.findings, 3)), advice)
         yield ""
         yield from self.written()
 

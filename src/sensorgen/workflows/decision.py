@@ -12,7 +12,7 @@ from sensorgen.checks.review import STEPS as CHECKS
 from sensorgen.checks.review import CheckReport, Review, Step, report
 from sensorgen.core.cache import Unknown, only_known
 from sensorgen.core.display import Boundless
-from sensorgen.core.document import Part
+from sensorgen.core.document import Part, apart
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Refused, headline, listed
 from sensorgen.core.parallel import open_lanes, used_s
@@ -51,14 +51,7 @@ class Decision(Boundless, CheckReport):
     def document(self) -> Iterator[Part]:
         """Verdict, numbers, findings and changes."""
         yield headline(self.name, self.findings, self.source)
-        if self.trial or self.reason:
-            yield from ("", *self.numbers())
-        if self.findings:
-            yield ""
-            yield from listed(self.findings)
-        if self.advice:
-            yield ""
-            yield from self.advice.document()
+        yield from apart(self.numbers(), listed(self.findings), self.advice.document() if self.advice else ())
 
     def page(self, printed: "Printed", held: Review, predicted: "Prediction") -> str:
         """All that is known of the design as one page, HTML."""
@@ -84,9 +77,7 @@ class RefusedBuild(Boundless, Refused):
     def document(self) -> Iterator[Part]:
         """Verdict, the findings that matter most, and changes."""
         yield from super().document()
-        if self.advice:
-            yield ""
-            yield from self.advice.document()
+        yield from apart(self.advice.document() if self.advice else ())
 
 
 @contextmanager

@@ -14,7 +14,7 @@ import yaml
 
 from sensorgen.core import files
 from sensorgen.core.arrays import Real
-from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.document import Column, Facts, Part, Table, apart
 from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding, listed
 from sensorgen.design import design as designs
@@ -282,11 +282,7 @@ class BodyListing:
     def document(self) -> Iterator[Part]:
         """All of it."""
         yield Table.of("bodies", "", self.bodies)
-        if self.findings:
-            yield ""
-            yield from listed(self.findings)
-        yield ""
-        yield f"To import it: {self.words()}"
+        yield from apart(listed(self.findings), [f"To import it: {self.words()}"])
 
     def words(self) -> str:
         """Words to type to import it."""
@@ -350,9 +346,7 @@ class Imported:
             ),
         ]
         yield Facts(tuple(rows))
-        if self.findings:
-            yield ""
-            yield from listed(self.findings)
+        yield from apart(listed(self.findings))
 
 
 def write(
