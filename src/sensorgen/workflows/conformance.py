@@ -94,7 +94,13 @@ def _one(word: str) -> File:
 
 
 def _pack(word: str) -> Pack:
-    return packs.beside(Path(word)) if Path(word).is_dir() else _named(word)
+    """A pack by its folder or its name."""
+    if Path(word).is_dir():
+        return packs.beside(Path(word))
+    known = {pack.name: pack for pack in [*packs.installed(), *packs.own(), *packs.shipped()]}
+    if word not in known:
+        raise UnknownName("pack", word, known)
+    return known[word]
 
 
 def _files(pack: Pack) -> list[File]:
@@ -103,13 +109,6 @@ def _files(pack: Pack) -> list[File]:
 
 def _nothing(word: str) -> BadInput:
     return BadInput(f"{word}: no files of a pack; expected folders as {', '.join(packs.SINGULAR)}")
-
-
-def _named(word: str) -> Pack:
-    known = {pack.name: pack for pack in [*packs.installed(), *packs.own(), *packs.shipped()]}
-    if word not in known:
-        raise UnknownName("pack", word, known)
-    return known[word]
 
 
 def trust(word: str) -> list[str]:
@@ -218,14 +217,9 @@ def _misplaced(pack: Pack) -> Faults:
         if near and folder.is_dir() and folder.name not in packs.SINGULAR:
             yield f"{folder.name}/", "nothing reads this folder", f"rename it to {near}"
     if (pack.folder / packs.MANIFEST).exists():  # else a folder with designs, whose files are named by their paths
-        yield from _in_no_folder(pack)
-
-
-def _in_no_folder(pack: Pack) -> Faults:
-    """Files beside the folders."""
-    for path in _listed(pack.folder, (".yaml", ".yml")):
-        if path.name != packs.MANIFEST and (kind := _kind_of(path)):
-            yield path.name, f"nothing reads this {packs.SINGULAR[kind]} here", f"move it to {kind}"
+        for path in _listed(pack.folder, (".yaml", ".yml")):
+            if path.name != packs.MANIFEST and (own := _kind_of(path)):
+                yield path.name, f"nothing reads this {packs.SINGULAR[own]} here", f"move it to {own}"
 
 
 def _listed(folder: Path, endings: str | tuple[str, ...] = "") -> list[Path]:
@@ -356,17 +350,13 @@ def _cases(params: type[Envelope], usual: dict[str, Any]) -> Iterator[tuple[str,
 
 
 def _scene_faults(scene: Scene, fill: Fill) -> Faults:
+    """Terminals, bodies that are no solids, overlap or leave their box, and air that a support does not fill."""
     terminals = sorted(body.terminal for body in scene.bodies if body.terminal)
     if terminals not in (["bottom", "top"], ["bottom", "middle", "top"]):
         yield "terminals", f"terminals are {terminals}", "give one body 'top', and one 'bottom'"
     by_body = {body.name: meshes.mesh(body) for body in scene.bodies}
     for body, fault in meshes.faults(scene, by_body):
         yield "scene", f"{body}: {fault}", "correct scene()"
-    yield from _volume_faults(scene, fill)
-
-
-def _volume_faults(scene: Scene, fill: Fill) -> Faults:
-    """Bodies that overlap or leave their box, and air that a support does not fill."""
     volume, box = sum(body.volume_mm3() for body in scene.bodies), math.prod(scene.size_mm)
     is_round = any(piece.is_round() for body in scene.bodies for piece in body.pieces)
     within = 1e-3 if is_round else 1e-9  # beside a circle, a support has chords
