@@ -158,8 +158,8 @@ def _terminals(
     every = _touching(bodies)
     if len(every) == 1 and len(bodies) > 1:  # its lowest and its highest body are shorted
         ends = {**dict.fromkeys(every[0], ""), bodies[0].name: "bottom", bodies[-1].name: "top", **given}
-        return ends, tuple(_shorts(every, ends))
-    ends = _by_height(every, {body.name: float(body.box_mm[:, 2].mean()) for body in bodies}, given)
+    else:
+        ends = _by_height(every, {body.name: float(body.box_mm[:, 2].mean()) for body in bodies}, given)
     return ends, tuple(_shorts(every, ends))
 
 
@@ -178,7 +178,11 @@ def _by_height(
     every: Sequence[Sequence[str]], middle_mm: Mapping[str, float], given: Mapping[str, str]
 ) -> dict[str, str]:
     """Terminal of each conductor: as given, else by the height of its group."""
-    ends = _as_given(every, given)
+    ends: dict[str, str] = {}
+    for group in every:  # all of it as the one that has a terminal given
+        for end in {given[name] for name in group if name in given}:
+            ends |= dict.fromkeys(group, end)
+    ends |= given
     left = [group for group in every if group[0] not in ends]
     electrodes = [group for group in every if any(ends.get(name) != "" for name in group)]
     _refuse_undecided(electrodes, left)
@@ -198,15 +202,6 @@ def _refuse_undecided(electrodes: Sequence[Sequence[str]], left: Sequence[Sequen
     raise MissingValue(
         f"{len(electrodes)} electrodes that do not touch: {apart}; give {words}, END top, middle, bottom or none"
     )
-
-
-def _as_given(every: Sequence[Sequence[str]], given: Mapping[str, str]) -> dict[str, str]:
-    """Terminal of each conductor of a group in which one has a terminal given."""
-    ends: dict[str, str] = {}
-    for group in every:
-        for end in {given[name] for name in group if name in given}:
-            ends |= dict.fromkeys(group, end)
-    return ends | dict(given)
 
 
 def _shorts(groups: Sequence[Sequence[str]], ends: Mapping[str, str]) -> Iterator[Finding]:
@@ -398,8 +393,8 @@ def write(
     old, drawn = _bodies_of(path), drawn_body(design).cells.first()
     files.replace(beside, content.encode())
     files.replace(path, text.encode())
-    if old:
-        _remove_unused(old)
+    if old and not any(old.name in other.read_text("utf-8", "replace") for other in old.parent.glob("*.yaml")):
+        old.unlink(missing_ok=True)  # no design beside it names it any more
     return Imported(
         str(path), str(beside), bodies.size_mm, tuple((-low.round(9) + 0.0).tolist()),
         {n: _words(design, n, own) for n, own in bodies.pieces.items()},
@@ -417,12 +412,6 @@ def _placed(assembly: Assembly) -> tuple[imported.Bodies, Real]:
     length, width, height = (high - low).round(9).tolist()
     chord = max(body.given.chord_mm for body in assembly.bodies)
     return imported.Bodies(pieces, (length, width, height), chord, assembly.source), low
-
-
-def _remove_unused(old: Path) -> None:
-    """Remove a file of bodies that no design beside it names any more."""
-    if not any(old.name in other.read_text("utf-8", "replace") for other in old.parent.glob("*.yaml")):
-        old.unlink(missing_ok=True)
 
 
 def _bodies_of(path: Path) -> Path | None:
