@@ -264,9 +264,7 @@ def _array(
     with ExitStack() as stack:
         stack.callback(meter.close)
         render.say(meter.identify().model, err=True)
-        if meter.shape != model.here.shape:
-            (m, n), (rows, columns) = meter.shape, model.here.shape
-            raise BadInput(f"frames of {m} x {n}; expected {rows} x {columns}, as of {model.design.name}")
+        _refuse_shape(meter, model)
         how = ArrayReadout(readout, input_ohm, (meter.frequency_hz,), noise)  # type: ignore[arg-type]
         live = LiveMaps(model, how, scatter, known(calibration), day)
         file = recorder(record, meter.shape, meter.frequency_hz) if record else None
@@ -304,6 +302,12 @@ def _first_press(crossing: str, shape: tuple[int, int]) -> "NamedPress | None":
 
     with within("--press"):
         return NamedPress(crossings((crossing,), shape)[crossing]) if crossing else None
+
+
+def _refuse_shape(meter: "FrameMeter", model: "ArrayModel") -> None:
+    if meter.shape != model.here.shape:
+        (m, n), (rows, columns) = meter.shape, model.here.shape
+        raise BadInput(f"frames of {m} x {n}; expected {rows} x {columns}, as of {model.design.name}")
 
 
 def _device(kind: str, port: str, clock: "Clock") -> "FrameMeter":

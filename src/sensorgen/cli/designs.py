@@ -257,13 +257,11 @@ class DesignOptions:
             slots |= {"top_electrode": value, "bottom_electrode": value} if part == "electrode" else {part: value}
         if self.support is not None:
             slots["support"] = None if self.support == "none" else self.support
-        stated = base.get("materials")
-        named = slots.get("dielectric") or (stated.get("dielectric") if isinstance(stated, dict) else None) or "x60"
         return {
             "parameters": {} if self.size is None else _size(self.size),
             "materials": slots,
             "tools": {key: _number(value, "--tool", int) for key, value in commands.pairs(self.tool, "--tool")},
-            "infill": self._infill(str(named).partition("@")[0]),
+            "infill": self._infill(_dielectric(base, slots)),
             "border": None if self.border is None else str(Path(self.border).absolute()),
             **{key: getattr(self, key) for key in ("orientation", "printer", "quality", "nozzle_mm", "shrinkage")},
         }
@@ -292,7 +290,7 @@ def _design(base: Data, given: Data, word: str) -> "Design":
     if isinstance(unnamed.get("materials"), dict):
         unnamed["materials"] = packs.slots(unnamed["materials"])
     chosen = DesignOptions(**arguments(DesignOptions, given))
-    parameters = {key.removeprefix(_OF_SHAPE): value for key, value in given.items() if key.startswith(_OF_SHAPE)}
+    parameters = _of_shape(given)
     data = settings.merged(unnamed, _given(chosen.changes(base) | {"tip": given["tip"]}, parameters))
     for key, value in commands.pairs(chosen.settings, "--set"):
         data = settings.merged(data, settings.setting(key, value, set(parameters)))
@@ -301,6 +299,11 @@ def _design(base: Data, given: Data, word: str) -> "Design":
     elif data == unnamed and "name" in base:
         data["name"] = base["name"]
     return design.make(data, word if _is_file(word) else "")
+
+
+def _of_shape(given: Data) -> Data:
+    """Parameters of the shape, None where they were not given."""
+    return {key.removeprefix(_OF_SHAPE): value for key, value in given.items() if key.startswith(_OF_SHAPE)}
 
 
 def _given(changes: Data, parameters: Data) -> Data:
@@ -316,6 +319,13 @@ def _size(text: str) -> Data:
     except (ValueError, BadInput):
         raise BadInput(f"--size {text!r}: expected LENGTHxWIDTH, as in 100x10") from None
     return {"length_mm": length, "width_mm": width}
+
+
+def _dielectric(base: Data, slots: Data) -> str:
+    """Name of the dielectric's material."""
+    stated = base.get("materials")
+    named = slots.get("dielectric") or (stated.get("dielectric") if isinstance(stated, dict) else None) or "x60"
+    return str(named).partition("@")[0]
 
 
 def _number(value: str, option: str, kind: type[int] | type[float]) -> float:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sensorgen.design.design import Design
     from sensorgen.measure.array_frames import Frames
     from sensorgen.measure.readings import Readings
+    from sensorgen.prediction.array.frames import PressureMaps
     from sensorgen.prediction.array.model import ArrayModel
     from sensorgen.prediction.array.sessions import ArrayCalibration
     from sensorgen.prediction.inverse.estimator import Prior
@@ -146,10 +147,7 @@ def invert(design: "Design", task: Task, frames: ArrayFrames) -> int:
         known(frames.calibration), read_in.day, not frames.cells,
     )  # fmt: skip
     if output := task.output or "-" * task.terminal:
-        if output == "-":
-            print("".join(maps.csv()), end="", flush=True)
-        else:
-            render.file(Path(output), maps.npz() if output.endswith(".npz") else "".join(maps.csv()))
+        _write(maps, output)
     if frames.plot is not None:
         from sensorgen.analysis.plots import array, static
 
@@ -175,6 +173,14 @@ def known(calibration: Path | None) -> "ArrayCalibration | None":
     from sensorgen.prediction.array.sessions import stored
 
     return stored(calibration) if calibration else None
+
+
+def _write(maps: "PressureMaps", output: str) -> None:
+    """The maps as NPZ, or a row per frame as CSV, "-" to the terminal."""
+    if output == "-":
+        print("".join(maps.csv()), end="", flush=True)
+    else:
+        render.file(Path(output), maps.npz() if output.endswith(".npz") else "".join(maps.csv()))
 
 
 SUFFIXES = (".csv", ".npz", ".h5", ".hdf5", ".hdf")

@@ -37,7 +37,7 @@ def why_not_applicable(scene: Scene) -> str | None:
     if reason := third_conductor(scene):
         return reason
     try:
-        gaps = [_gap(column) for part in overlay_parts(scene) for column in _distinct(part).values()]
+        gaps = _gaps(scene)
     except ValueError as error:
         return str(error)
     known = [(gap.bottom_mm, gap.top_mm) for gap in gaps if gap is not None]
@@ -129,6 +129,10 @@ class _Gap:
     bottom_mm: tuple[float, float]
     top_mm: tuple[float, float]
     layers: tuple[Layer, ...]
+
+
+def _gaps(scene: Scene) -> list[_Gap | None]:
+    return [_gap(column) for part in overlay_parts(scene) for column in _distinct(part).values()]
 
 
 def _gap(cell: SectionColumn) -> _Gap | None:

@@ -402,11 +402,7 @@ def _numbered(
     near = abs(slab[one] - slab[other]) < 2
     kinds = _conductors(groups(len(slab), one[near], other[near]).tolist(), terminals)
     conductors = len({BOTTOM, TOP, *kinds.tolist()})
-    own = {name: plans[kinds == end] for end, name in ((BOTTOM, "bottom"), (TOP, "top"))}
-    if missing := [name for name, region in own.items() if not len(region)]:
-        raise ValueError(f"the scene has no {missing[0]} electrode")
-    whole = _COVERS * sizes[0] * sizes[1]
-    uncovered = next((name for name, region in own.items() if shapely.union_all(region).area < whole), "")
+    uncovered = _uncovered(plans, kinds, sizes)
     low, high = int(slab[kinds == BOTTOM].min()), int(slab[kinds == TOP].max())
     if uncovered:  # the field leaves the electrodes
         low, high = 0, len(inside) - 1
@@ -458,6 +454,15 @@ def _conductors(connected: Sequence[int], terminals: Sequence[str]) -> Whole:
     for piece in connected:
         numbers.setdefault(piece, len({*numbers.values(), BOTTOM, TOP}))
     return np.array([numbers[piece] for piece in connected], int)
+
+
+def _uncovered(plans: np.ndarray, kinds: np.ndarray, sizes_mm: tuple[float, float]) -> str:
+    """The electrode that does not cover the whole cell, or ""; raises ValueError where there is none."""
+    own = {name: plans[kinds == end] for end, name in ((BOTTOM, "bottom"), (TOP, "top"))}
+    if missing := [name for name, region in own.items() if not len(region)]:
+        raise ValueError(f"the scene has no {missing[0]} electrode")
+    whole = _COVERS * sizes_mm[0] * sizes_mm[1]
+    return next((name for name, region in own.items() if shapely.union_all(region).area < whole), "")
 
 
 def _gap_mm(regions: Sequence[dict[int, Region]], heights_mm: Sequence[float], conductors: int) -> float:

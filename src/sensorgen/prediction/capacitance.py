@@ -289,19 +289,9 @@ def capacitance(
     return replace(_of_plain(data), known=known is not None)
 
 
-def weighed(scene: Scene, width: float = inf, model: str = "", lossy: bool = False) -> tuple[PlanCandidate, ...]:
-    """The plan before anything is asked: all models of capacitance in the order in which they would be.
-
-    Parameters
-    ----------
-    scene, width, model : Scene, float, str
-        As of :func:`capacitance`.
-    lossy : bool
-        Whether a dielectric loses.
-    """
-    kind = _LOSSY if lossy else _LOSSLESS
-    plan = _ordered(scene, width, model)
-    return tuple(replace(c, passed_over=c.passed_over or _unfit(c, scene, kind)) for c in plan)
+def weighed(scene: Scene, width: float) -> tuple[PlanCandidate, ...]:
+    """The plan of a width before anything is asked: all models of capacitance in the order in which they would be."""
+    return tuple(replace(c, passed_over=_unfit(c, scene, _LOSSLESS)) for c in _ordered(scene, width, ""))
 
 
 def _ordered(scene: Scene, width: float, model: str) -> list[PlanCandidate]:
@@ -355,10 +345,7 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
             plan.append(replace(candidate, passed_over=str(error)))
             continue
         bounds[candidate.model] = bound
-        for part in zip(*(_parts(bound) for bound in bounds.values()), strict=True):
-            named = {name: bound for name, bound in zip(bounds, part, strict=True) if bound}
-            if named:
-                _refuse_apart(named)
+        _refuse_contradiction(bounds)
         plan.append(replace(candidate, width=bound.width(), seconds=seconds))
     if not bounds:
         raise Unpredictable(_together(refused))
@@ -387,6 +374,14 @@ def _parts(bound: Interval | Disc) -> tuple[Interval, Interval | None]:
         return bound, None
     real, loss = bound.centre.real, -bound.centre.imag
     return Interval(real - bound.radius, real + bound.radius), Interval(loss - bound.radius, loss + bound.radius)
+
+
+def _refuse_contradiction(bounds: Mapping[str, Interval | Disc]) -> None:
+    """All of them hold the truth: any two overlap."""
+    for part in zip(*(_parts(bound) for bound in bounds.values()), strict=True):
+        named = {name: bound for name, bound in zip(bounds, part, strict=True) if bound}
+        if named:
+            _refuse_apart(named)
 
 
 def _refuse_apart(bounds: Mapping[str, Interval]) -> None:

@@ -124,8 +124,7 @@ def law_of(
         raise OutOfRange(f"{condition}; {design.shape} has gaps: expected 'unconfined' or the sides symmetric")
     stored = None if name in ("unconfined", "infill") else _stored(design, printed)
     if stored and until_pa <= _PAST * stored.stress_pa[-1]:
-        tops = {EVEN: stored, STIFF: stored.scaled_rise(1 + stored.stiff_change)}
-        return _cell(tops.get(tip.block) or stored.under_block(usual=_is_usual(design, tip)), moduli, tops)
+        return _stored_law(stored, moduli, tip, usual=_is_usual(design, tip))
     if name == "solved":
         return solved(design, printed, tip=tip, until_pa=until_pa)
     return _unsolved(design, moduli[film(design)], name, piece)
@@ -133,10 +132,8 @@ def law_of(
 
 def _unsolved(design: Design, soft: MaterialValue, name: str, piece: PressedPiece) -> Law:
     """A cell with gaps as infill where it is like that, else as a plate of its soft material, of unknown error."""
-    by_infill = (
-        infill(design, piece) if name == "infill" or (name != "unconfined" and piece.period_mm is None) else None
-    )
-    if by_infill:
+    may = name == "infill" or (name != "unconfined" and piece.period_mm is None)
+    if may and (by_infill := infill(design, piece)):
         return by_infill
     if name == "infill":
         raise OutOfRange(
@@ -283,13 +280,10 @@ def _stored(design: Design, printed: PressedPiece | None) -> CapacitanceCurve | 
         # Estimates; G-code, of which equal slices differ by 4 nm; both as mirror images, as other counts of periods are
         keys = (content(printed, digits, turned=turned) for turned in (False, True) for digits in (6, 3))
         curve = next(filter(None, (compression.solved_print(key, moduli_pa) for key in keys)), None)
-    return curve if curve and _incompressible(design) else None
-
-
-def _incompressible(design: Design) -> bool:
-    """Test whether all materials have the Poisson's ratio of the stored cells."""
+    if not curve:
+        return None
     ratios = (taken.value for taken in of_all_materials(design, "poisson_ratio").values())
-    return all(abs(ratio - compression.SOLVED_RATIO) < _SAME_RATIO for ratio in ratios)
+    return curve if all(abs(ratio - compression.SOLVED_RATIO) < _SAME_RATIO for ratio in ratios) else None
 
 
 def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> str:
@@ -403,6 +397,12 @@ def _ends(curve: CapacitanceCurve) -> tuple[CapacitanceCurve, CapacitanceCurve]:
     """A curve with the least and the largest rise within its error."""
     least, most = (replace(curve.scaled_rise(1 + s * curve.within), onset=1 + s * _ONSET) for s in (-1, 1))
     return least, most
+
+
+def _stored_law(even: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tip: Tip, *, usual: bool) -> Law:
+    """Law of a stored cell, solved under an even pressure, and under the ``usual`` block."""
+    tops = {EVEN: even, STIFF: even.scaled_rise(1 + even.stiff_change)}
+    return _cell(tops.get(tip.block) or even.under_block(usual=usual), moduli, tops)
 
 
 def _is_usual(design: Design, tip: Tip) -> bool:
@@ -569,6 +569,14 @@ def under_tops(
     return curves
 
 
+def _few_pa(stress_pa: float, tip: Tip) -> Real:
+    """A few pressures up to beyond one, where it is among those of :func:`under_tops` these [Pa]."""
+    last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
+    usual = stresses_pa(stress_pa)[-1] * np.array(_COARSE)
+    is_usual = stress_pa <= last_pa and not tip.soft and stress_pa in usual
+    return usual if is_usual else last_pa * np.array([0.0, 0.4, 0.8, 1.0])
+
+
 def at_a_few_pressures(
     design: Design, printed: PressedPiece, answer: Answer, stress_pa: float, name: str = "", *, tip: Tip = FLAT,
     level: int = mesh_ladder.COARSEST,
@@ -608,10 +616,7 @@ def at_a_few_pressures(
         return law if law.bounded else None
     try:
         case = case_of(design, printed, model, tip)
-        last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
-        usual = stresses_pa(stress_pa)[-1] * np.array(_COARSE)
-        is_usual = stress_pa <= last_pa and not tip.soft and stress_pa in usual
-        solution = pressed(case, (usual if is_usual else last_pa * np.array([0.0, 0.4, 0.8, 1.0])).tolist(), level)
+        solution = pressed(case, _few_pa(stress_pa, tip).tolist(), level)
         curve = curve_of(solution)
     except SensorgenError:
         return None

@@ -192,11 +192,7 @@ class ErrorBudget:
         yield Table("budget", caption, columns, tuple((t.name, *_percent(t, 4), t.remark()) for t in terms))
         largest = self.largest()
         yield f"largest: {largest.name} ({largest.what})"
-        known = [t for t in self.terms if t.changes]
-        most = max(known, key=lambda t: (t.changes or Changes()).re, default=None)
-        left = sum((t.changes or Changes()).re for t in known if t is not most)
-        if most and self.total and left < _LEFT * self.total.re:
-            yield f"R at its worst is that of one term, {most.name}: {100 * left:.2g} % without it"
+        yield from self._by_one()
         if not self.accuracy:
             return
         beyond = f"; larger alone: {', '.join(self.beyond())}" if self.beyond() else ""
@@ -206,6 +202,14 @@ class ErrorBudget:
             yield f"accuracy {self.accuracy:g} of |Z| reached by the models, not by print, material and leads{beyond}"
         else:
             yield f"accuracy {self.accuracy:g} of |Z| not reached by the models{beyond}"
+
+    def _by_one(self) -> Iterator[str]:
+        """Remainder of R at its worst without one term that is nearly all of it, as one over D squared is."""
+        known = [t for t in self.terms if t.changes]
+        most = max(known, key=lambda t: (t.changes or Changes()).re, default=None)
+        left = sum((t.changes or Changes()).re for t in known if t is not most)
+        if most and self.total and left < _LEFT * self.total.re:
+            yield f"R at its worst is that of one term, {most.name}: {100 * left:.2g} % without it"
 
     def assumed(self) -> Iterator[Part]:
         """Effects of each assumption alone at the ends of its range, the largest on a press first."""

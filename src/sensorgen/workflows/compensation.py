@@ -280,17 +280,21 @@ class CompensationSearch(Nearest):
             self._correct(one)
         else:
             self.estimates[one] = answer
-        is_exact = one in self.prints or not one.values
-        aim = self.wanted if is_exact else self.aim
-        within = WITHIN if is_exact or _has_whole_periods(one) else ESTIMATE_WITHIN
-        keys = list(aim) if one.stage > 1 else [GAP, CAPACITANCE]
-        is_reached = all(abs(_off(answer, aim, key)) <= within[key] for key in keys)
+        is_reached = self._is_reached(one, answer)
         if one.stage < len(self.works) and (is_reached or not one.values):
             return [one]
         if is_reached:
             self.best = one
             return ()
         return self._neighbours(one) if is_print or not _has_whole_periods(one) else ()
+
+    def _is_reached(self, one: Candidate, answer: Quantities) -> bool:
+        """Test whether a print, or the first estimate, is as wanted, others as estimates of wanted prints are."""
+        is_exact = one in self.prints or not one.values
+        aim = self.wanted if is_exact else self.aim
+        within = WITHIN if is_exact or _has_whole_periods(one) else ESTIMATE_WITHIN
+        keys = list(aim) if one.stage > 1 else [GAP, CAPACITANCE]
+        return all(abs(_off(answer, aim, key)) <= within[key] for key in keys)
 
     def _at_rest(self, one: Candidate) -> Quantities:
         """Gap with the margin, and the capacitance where that is the wanted one; nothing of what cannot be made."""

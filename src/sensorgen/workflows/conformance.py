@@ -207,11 +207,7 @@ def _kind_of(path: Path) -> Kind | Literal[""]:
 
 def _misplaced(pack: Pack) -> Faults:
     """Files that nothing reads: of another ending or name than those of their folder, or in no folder of a kind."""
-    for kind in packs.SINGULAR:
-        read = {f"{name}{packs.suffix(kind)}" for name in pack.names(kind)} | {"__init__.py"}
-        for path in _listed(pack.place(kind), (".yaml", ".yml", ".py")):
-            if path.name not in read:
-                yield f"{kind}/{path.name}", "nothing reads this file", _where_to(path, kind)
+    yield from _unread(pack)
     for folder in _listed(pack.folder):
         near = nearest(folder.name, packs.SINGULAR)
         if near and folder.is_dir() and folder.name not in packs.SINGULAR:
@@ -220,6 +216,15 @@ def _misplaced(pack: Pack) -> Faults:
         for path in _listed(pack.folder, (".yaml", ".yml")):
             if path.name != packs.MANIFEST and (own := _kind_of(path)):
                 yield path.name, f"nothing reads this {packs.SINGULAR[own]} here", f"move it to {own}"
+
+
+def _unread(pack: Pack) -> Faults:
+    """Files of another ending or name than those of their folder."""
+    for kind in packs.SINGULAR:
+        read = {f"{name}{packs.suffix(kind)}" for name in pack.names(kind)} | {"__init__.py"}
+        for path in _listed(pack.place(kind), (".yaml", ".yml", ".py")):
+            if path.name not in read:
+                yield f"{kind}/{path.name}", "nothing reads this file", _where_to(path, kind)
 
 
 def _listed(folder: Path, endings: str | tuple[str, ...] = "") -> list[Path]:
@@ -261,9 +266,7 @@ def _material(file: File) -> Faults:
     for quantity, values in (*material.properties.items(), *material.print.items()):
         if quantity not in known:
             yield "quantity", str(UnknownName("quantity", quantity, known)), "take a name that sensorgen reads"
-        usable = [value.source for value in values if not value.implausible and math.isfinite(value.value)]
-        if usable and not any(value.default for value in values):
-            yield "default", f"{quantity} has no default value", f"add 'default: true' to that of {usable[0]}"
+        yield from _default(quantity, values)
         for value in values:
             if value.source not in cited:
                 where = "say under 'citations' where it is published"
@@ -272,6 +275,13 @@ def _material(file: File) -> Faults:
                 yield "default", f"{quantity} of {value.source} is implausible and a default", "remove one of them"
     if not material.properties and not material.print:
         yield "values", "no values", "add at least one quantity"
+
+
+def _default(quantity: str, values: Sequence[materials.Value]) -> Faults:
+    """Lack of a default among the values of one quantity."""
+    usable = [value.source for value in values if not value.implausible and math.isfinite(value.value)]
+    if usable and not any(value.default for value in values):
+        yield "default", f"{quantity} has no default value", f"add 'default: true' to that of {usable[0]}"
 
 
 def _program(file: File, text: str) -> Faults:
@@ -350,13 +360,17 @@ def _cases(params: type[Envelope], usual: dict[str, Any]) -> Iterator[tuple[str,
 
 
 def _scene_faults(scene: Scene, fill: Fill) -> Faults:
-    """Terminals, bodies that are no solids, overlap or leave their box, and air that a support does not fill."""
     terminals = sorted(body.terminal for body in scene.bodies if body.terminal)
     if terminals not in (["bottom", "top"], ["bottom", "middle", "top"]):
         yield "terminals", f"terminals are {terminals}", "give one body 'top', and one 'bottom'"
     by_body = {body.name: meshes.mesh(body) for body in scene.bodies}
     for body, fault in meshes.faults(scene, by_body):
         yield "scene", f"{body}: {fault}", "correct scene()"
+    yield from _volume_faults(scene, fill)
+
+
+def _volume_faults(scene: Scene, fill: Fill) -> Faults:
+    """Bodies that overlap or leave their box, and air that a support does not fill."""
     volume, box = sum(body.volume_mm3() for body in scene.bodies), math.prod(scene.size_mm)
     is_round = any(piece.is_round() for body in scene.bodies for piece in body.pieces)
     within = 1e-3 if is_round else 1e-9  # beside a circle, a support has chords

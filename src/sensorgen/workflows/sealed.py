@@ -176,18 +176,23 @@ def _against_log(folder: Path, key: str, data: Mapping[str, Any], log: "Log") ->
 def _compared(
     folder: Path, record: str, known: Mapping[str, str], wrong: tuple[str, ...], *, others: bool
 ) -> Differences:
-    try:
-        linked = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_symlink())
-        here = {name: value for name, value in store.hashes(folder).items() if name not in (record, *linked)}
-    except OSError as error:
-        raise BadInput(f"cannot read {error.filename!r}: {error.strerror or error}") from None
-    links = [name for name in linked if name != record and (not others or name in known)]
+    links, here = _there(folder, record)
+    links = [name for name in links if name != record and (not others or name in known)]
     return Differences(
         missing=tuple(sorted(set(known) - set(here) - set(links))),
         changed=tuple(sorted(name for name in set(known) & set(here) if known[name] != here[name])),
         extra=() if others else tuple(sorted(set(here) - set(known))),
         links=tuple(links), record=wrong,
     )  # fmt: skip
+
+
+def _there(folder: Path, record: str) -> tuple[list[str], dict[str, str]]:
+    """Links in a folder, and the hashes of its files but for these and the record."""
+    try:
+        links = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_symlink())
+        return links, {name: value for name, value in store.hashes(folder).items() if name not in (record, *links)}
+    except OSError as error:
+        raise BadInput(f"cannot read {error.filename!r}: {error.strerror or error}") from None
 
 
 def set_aside(folder: Path, design: Design) -> tuple[str, ...]:

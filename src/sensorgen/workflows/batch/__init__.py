@@ -1,7 +1,7 @@
 """Print batches: a plan of designs and copies becomes one plate, with a record of what lies where."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -190,11 +190,7 @@ def make(
     placed = arranged(path)
     step("checks")
     reviews = {key: reviewed(design) for key, design in placed.designs.items()}
-    wrong = [key for key in reviews if reviews[key].errors(strict)]
-    if wrong and not force:
-        every = [f for key in wrong for f in reviews[key].findings]
-        stopping = [f for key in wrong for f in reviews[key].errors(strict)]
-        raise Unprintable(every, stopping).within(placed.designs[wrong[0]].name)
+    _refuse_unprintable(placed, reviews, force=force, strict=strict)
     step("predictions")
     prints = [(bodies.of_file(design, reviews[key].file),) for key, design in placed.designs.items()]
     known = dict(remembered(evaluate, prints, jobs, cluster=cluster))
@@ -218,6 +214,14 @@ def make(
         store.publish(stage, folder, record.RECORD)
     step("done")
     return Batch(folder, batch, {placed.designs[key].name: review for key, review in reviews.items()})
+
+
+def _refuse_unprintable(placed: Arranged, reviews: Mapping[str, Review], *, force: bool, strict: bool) -> None:
+    wrong = [key for key in reviews if reviews[key].errors(strict)]
+    if wrong and not force:
+        every = [f for key in wrong for f in reviews[key].findings]
+        stopping = [f for key in wrong for f in reviews[key].errors(strict)]
+        raise Unprintable(every, stopping).within(placed.designs[wrong[0]].name)
 
 
 def _on_plate(plan: BatchPlan, pieces: Sequence[PrintPiece], plate: Plate) -> list[Placed]:

@@ -280,10 +280,7 @@ def lines_of(form: Form) -> LineReadings:
     _refuse_unknown(LINES, given, _line_fields())
     fields = {key: given.get(key) for key in _line_fields()}
     for key, value in fields.items():
-        if key.endswith("short") and value not in (None, True, False):
-            raise BadInput(f"{LINES}.{key} is {shown(value)}; expected true, false or ~")
-        if key.startswith("vernier") and (isinstance(value, bool) or value not in (None, *range(-5, 6))):
-            raise OutOfRange(f"{LINES}.{key} is {shown(value)}; expected a whole number from -5 to 5, or ~")
+        _refuse_entry(key, value)
     walls, offsets, films, combs = (
         {key: value for key, value in fields.items() if key.startswith(kind)}
         for kind in ("wall", "vernier", "film", "comb")
@@ -293,3 +290,11 @@ def lines_of(form: Form) -> LineReadings:
         tuple(None if value is None else STEP_MM * value for value in offsets.values()),
         tuple(films.values()), tuple(combs.values()),
     )  # fmt: skip
+
+
+def _refuse_entry(key: str, value: Any) -> None:
+    """Refuse what is no answer about a short, and no line of a vernier."""
+    if key.endswith("short") and value not in (None, True, False):
+        raise BadInput(f"{LINES}.{key} is {shown(value)}; expected true, false or ~")
+    if key.startswith("vernier") and (isinstance(value, bool) or value not in (None, *range(-5, 6))):
+        raise OutOfRange(f"{LINES}.{key} is {shown(value)}; expected a whole number from -5 to 5, or ~")

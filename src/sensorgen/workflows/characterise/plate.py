@@ -235,14 +235,19 @@ def picture(
         coupon = coupons[number] if number < len(coupons) else None
         pieces = bodies(coupon, *names) if coupon else lines_bodies(design, *names)
         x, y = place.centre_mm[0] - bed.x0, bed.y1 - place.centre_mm[1]
-        spans = [[p.span(axis) for body in pieces for p in body.pieces] for axis in "xy"]
-        centre = [(min(a for a, _ in span) + max(b for _, b in span)) / 2 for span in spans]
-        shift = x - centre[0], y + centre[1]
+        shift = _shift(pieces, x, y)
         shapes += [*_outlines(pieces, shift, fills), *(_marks(coupon, pieces, shift) if coupon else ())]
         shapes.append(middle(x, y, 4.6, str(order), "halo"))
         listed.append(f"{order}: {coupon.name if coupon else 'lines and shorts'}")
     heading = f"{name}: {len(plate)} coupons on {design.machine.title}"
     return bed_svg(bed, heading, "x to the right, y up; lines of bars run along x", shapes, listed, _NOTES)
+
+
+def _shift(pieces: Sequence[Body], x: float, y: float) -> tuple[float, float]:
+    """Shift of bodies whose middle comes to a place [mm]."""
+    spans = [[p.span(axis) for body in pieces for p in body.pieces] for axis in "xy"]
+    centre = [(min(a for a, _ in span) + max(b for _, b in span)) / 2 for span in spans]
+    return x - centre[0], y + centre[1]
 
 
 def _outlines(pieces: Sequence[Body], shift: tuple[float, float], fills: Mapping[str, str]) -> Iterator[str]:

@@ -178,11 +178,7 @@ def _by_height(
     every: Sequence[Sequence[str]], middle_mm: Mapping[str, float], given: Mapping[str, str]
 ) -> dict[str, str]:
     """Terminal of each conductor: as given, else by the height of its group."""
-    ends: dict[str, str] = {}
-    for group in every:  # all of it as the one that has a terminal given
-        for end in {given[name] for name in group if name in given}:
-            ends |= dict.fromkeys(group, end)
-    ends |= given
+    ends = _as_given(every, given)
     left = [group for group in every if group[0] not in ends]
     electrodes = [group for group in every if any(ends.get(name) != "" for name in group)]
     _refuse_undecided(electrodes, left)
@@ -202,6 +198,15 @@ def _refuse_undecided(electrodes: Sequence[Sequence[str]], left: Sequence[Sequen
     raise MissingValue(
         f"{len(electrodes)} electrodes that do not touch: {apart}; give {words}, END top, middle, bottom or none"
     )
+
+
+def _as_given(every: Sequence[Sequence[str]], given: Mapping[str, str]) -> dict[str, str]:
+    """Terminal of each conductor of a group in which one has a terminal given."""
+    ends: dict[str, str] = {}
+    for group in every:
+        for end in {given[name] for name in group if name in given}:
+            ends |= dict.fromkeys(group, end)
+    return ends | dict(given)
 
 
 def _shorts(groups: Sequence[Sequence[str]], ends: Mapping[str, str]) -> Iterator[Finding]:
@@ -331,7 +336,7 @@ class Imported:
         rows = [
             ("size", f"{size} mm" + (f"; moved by {moved} mm, its corner to 0, 0, 0" if any(self.moved_mm) else "")),
             *self.bodies.items(),
-            ("capacitance as drawn", ", ".join(reasons.get("", ())) or f"no model applies, only as printed ({why})"),
+            ("capacitance as drawn", (", ".join(reasons.get("", ())) or f"no model applies, only as printed ({why})")),
             ("written", f"{self.design} and {self.geometry}"),
             (
                 "next",
@@ -393,8 +398,8 @@ def write(
     old, drawn = _bodies_of(path), drawn_body(design).cells.first()
     files.replace(beside, content.encode())
     files.replace(path, text.encode())
-    if old and not any(old.name in other.read_text("utf-8", "replace") for other in old.parent.glob("*.yaml")):
-        old.unlink(missing_ok=True)  # no design beside it names it any more
+    if old:
+        _remove_unused(old)
     return Imported(
         str(path), str(beside), bodies.size_mm, tuple((-low.round(9) + 0.0).tolist()),
         {n: _words(design, n, own) for n, own in bodies.pieces.items()},
@@ -412,6 +417,12 @@ def _placed(assembly: Assembly) -> tuple[imported.Bodies, Real]:
     length, width, height = (high - low).round(9).tolist()
     chord = max(body.given.chord_mm for body in assembly.bodies)
     return imported.Bodies(pieces, (length, width, height), chord, assembly.source), low
+
+
+def _remove_unused(old: Path) -> None:
+    """Remove a file of bodies that no design beside it names any more."""
+    if not any(old.name in other.read_text("utf-8", "replace") for other in old.parent.glob("*.yaml")):
+        old.unlink(missing_ok=True)
 
 
 def _bodies_of(path: Path) -> Path | None:

@@ -198,6 +198,15 @@ def _edges(edges_mm: Real) -> str:
     return " x ".join(f"{edge:.6g}" for edge in edges_mm)
 
 
+def _likely_units(size_mm: Real, unit: str) -> str:
+    """Units, and the sizes in them, with which it is as large as a sensor can be; "" for none."""
+    scales = mesh_files.UNITS_MM
+    sizes = [(name, size_mm * scale / scales[unit or "mm"]) for name, scale in scales.items()]
+    sizes += [("mm", size_mm / scale) for scale in scales.values()] if not unit else []
+    likely = {name: _edges(edges) for name, edges in reversed(sizes) if _is_sensor(edges)}
+    return " or ".join(f"{name} ({likely[name]} mm)" for name in scales if name in likely)
+
+
 def _sizes(bodies: Sequence[ReadBody], unit: str) -> list[Finding]:
     """A finding where the sensor is larger or smaller than one can be: its unit, given or the file's own, is wrong."""
     box = np.array([body.box_mm for body in bodies])
@@ -205,11 +214,7 @@ def _sizes(bodies: Sequence[ReadBody], unit: str) -> list[Finding]:
     size = high - low
     if _is_sensor(size):
         return []
-    scales = mesh_files.UNITS_MM
-    sizes = [(name, size * scale / scales[unit or "mm"]) for name, scale in scales.items()]
-    sizes += [("mm", size / scale) for scale in scales.values()] if not unit else []
-    likely = {name: _edges(edges) for name, edges in reversed(sizes) if _is_sensor(edges)}
-    words = " or ".join(f"{name} ({likely[name]} mm)" for name in scales if name in likely)
+    words = _likely_units(size, unit)
     hint = f"its numbers may be in {words}" if words else "no unit makes a sensor of it: look at its dimensions"
     return [
         Finding("11-size", "error", "sensor",

@@ -409,11 +409,16 @@ def candidates(target: Target, folder: Path = Path()) -> list[Candidate]:
     every = [whole.candidate(chosen | values) for chosen, inside in whole.parts for values in _combinations(inside)]
     for key, given in target.parameters.items():
         if not isinstance(given, Range):
-            for value in given:
-                own = [candidate for candidate in every if candidate.values.get(key) == value]
-                if own and not any(candidate.made for candidate in own):
-                    raise BadInput(f"parameters.{key}: no design can have {value!r}: {own[0].discarded}")
+            _refuse_impossible(key, given, every)
     return every
+
+
+def _refuse_impossible(key: str, values: list[Value], every: list[Candidate]) -> None:
+    """Refuse a value that no design can have."""
+    for value in values:
+        own = [candidate for candidate in every if candidate.values.get(key) == value]
+        if own and not any(candidate.made for candidate in own):
+            raise BadInput(f"parameters.{key}: no design can have {value!r}: {own[0].discarded}")
 
 
 def space(target: Target, folder: Path = Path()) -> Space:
