@@ -194,7 +194,7 @@ def _kind(field: "dataclasses.Field[Any]") -> "click.ParamType[Any]":
     """Kind of a parameter's words: one of its choices, a number, or a length."""
     if choices := field.metadata.get("choices"):
         return commands.OneOf(choices)
-    return click.FLOAT if field.name.endswith("_deg") or field.metadata.get("count") else commands.Length()
+    return click.FLOAT if field.name.endswith("_deg") or field.metadata.get("count") else commands.KINDS["length"]
 
 
 @dataclasses.dataclass(frozen=True)
