@@ -22,6 +22,7 @@ from sensorgen.design.values import ASSUMED, ENDS, MaterialValue, assumed, lead_
 from sensorgen.models import line, refusal
 from sensorgen.models.compression import Compression
 from sensorgen.models.sensor import Sensor
+from sensorgen.prediction import rest_state as resting
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.compression_law import CLOSED_FORM, at_a_few_pressures
 from sensorgen.prediction.error_budget import error_budget, material_ends, modulus_range
@@ -30,17 +31,6 @@ from sensorgen.prediction.identifiability.identify import identify
 from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.query import FORCE_N, Load, Query
 from sensorgen.prediction.reference_load import ReferenceLoad
-from sensorgen.prediction.rest_state import (
-    LARGEST_TANGENT,
-    LOWEST_HZ,
-    Added,
-    Lost,
-    RestState,
-    added,
-    electrode_resistance,
-    lost,
-    rest_state,
-)
 from sensorgen.prediction.results import SCHEMA, Impedance, Narrowing, Prediction, UnderTop
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece, sensor_model
 from sensorgen.scene.slabs import is_open
@@ -122,12 +112,12 @@ def prediction(body: Body, query: Query) -> Prediction:
     try:
         result = replace(result, gap=_gap(body))
         model, plan, reason = _model(body, query)
-        rest = model.rest if model else rest_state(body)
+        rest = model.rest if model else resting.rest_state(body)
         result = _at_rest(replace(result, status="predicted", reason=reason), body, rest, query.frequency_hz)
     except SensorgenError as error:  # no model applies, a value is missing, an electrode or a tool path is interrupted
         touches = result.gap is not None and result.gap.value == 0
         with suppress(SensorgenError):  # as a resistivity that is missing
-            result = replace(result, resistance=electrode_resistance(body))
+            result = replace(result, resistance=resting.electrode_resistance(body))
         return replace(result, status="short" if touches else "not predicted", reason=str(error))
     values, doubts = (model.values, model.doubts) if model else (rest.values, rest.doubts)
     result = replace(result, plan=plan, values=values, assumptions=tuple(_assumptions(body, model)), doubts=doubts)
@@ -156,9 +146,14 @@ def _gap(body: Body) -> Bounds | None:
     return Bounds.of(gaps[0], "m", print=by_print, certified=True)
 
 
-def _at_rest(result: Prediction, body: Body, rest: RestState, frequency_hz: tuple[float, ...]) -> Prediction:
+def _at_rest(result: Prediction, body: Body, rest: resting.RestState, frequency_hz: tuple[float, ...]) -> Prediction:
     """Capacitance, resistance, corner frequency and impedance without a load."""
-    r_only, c_only, gone, (farad, ohm) = rest.resistance, rest.capacitance, lost(body.design), added(body)
+    r_only, c_only, gone, (farad, ohm) = (
+        rest.resistance,
+        rest.capacitance,
+        resting.lost(body.design),
+        resting.added(body),
+    )
     resistance, c = {end: r.plus(*ohm) for end, r in r_only.items()}, c_only.plus(*farad)
     if set(resistance) != set(ENDS):
         return replace(result, capacitance=c, resistance=resistance)
@@ -173,7 +168,7 @@ def _at_rest(result: Prediction, body: Body, rest: RestState, frequency_hz: tupl
     )  # fmt: skip
 
 
-def impedance_at(prediction: Prediction, frequency_hz: float, gone: Lost) -> Impedance | None:
+def impedance_at(prediction: Prediction, frequency_hz: float, gone: resting.Lost) -> Impedance | None:
     """Impedance at rest of a predicted sensor at any frequency; None where it is no line of two electrodes."""
     if prediction.capacitance is None or set(prediction.resistance) != set(ENDS):
         return None
@@ -192,10 +187,10 @@ def parallel_range_f(prediction: Prediction, frequency_hz: float) -> Interval:
     return Interval(min(values), max(values))
 
 
-def _beyond(quantity: Bounds) -> Added:
+def _beyond(quantity: Bounds) -> resting.Added:
     """Least and most that leads may add to the value of a quantity."""
     ends = quantity.leads or Interval(quantity.value, quantity.value)
-    return Added(0.0, ends.lower - quantity.value, ends.upper - quantity.value)
+    return resting.Added(0.0, ends.lower - quantity.value, ends.upper - quantity.value)
 
 
 def _of_line(r: Bounds, c: Bounds, of: Callable[[float, float], float], unit: str) -> Bounds:
@@ -213,7 +208,8 @@ def _of_line(r: Bounds, c: Bounds, of: Callable[[float, float], float], unit: st
 
 
 def _impedance(
-    frequency_hz: float, r: Bounds, c: Bounds, gone: Lost, leads: tuple[Added, Added], dispersion: float = 0.0
+    frequency_hz: float, r: Bounds, c: Bounds, gone: resting.Lost, leads: tuple[resting.Added, resting.Added],
+    dispersion: float = 0.0,
 ) -> Impedance:  # fmt: skip
     """Of the unloaded line at one frequency, at the end of its leads; r and c of the whole sensor.
 
@@ -225,7 +221,7 @@ def _impedance(
     @cache  # the same line at the end of other leads
     def own(ohm: float, farad: float, n: float, tangent: float) -> complex:
         lossy = 1j + tangent + tan(n * pi / 2)
-        admittance = omega * farad * (frequency_hz / LOWEST_HZ) ** -n * lossy + gone.leak_s
+        admittance = omega * farad * (frequency_hz / resting.LOWEST_HZ) ** -n * lossy + gone.leak_s
         return complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
 
     def z(
@@ -244,8 +240,8 @@ def _impedance(
     def part(name: str) -> Bounds:
         known = _of_line(r, c, lambda ohm, farad: float(getattr(z(ohm, farad), name)), "ohm")
         over, by = ([float(getattr(one, name)) for one in many] for many in (ends, alone))
-        lost = [float(getattr(z(r.value, c.value, n=n, tangent=tangent), name)) for n, tangent in losses]
-        material = Interval(min(known.material.lower, *lost), max(known.material.upper, *lost))
+        lossy = [float(getattr(z(r.value, c.value, n=n, tangent=tangent), name)) for n, tangent in losses]
+        material = Interval(min(known.material.lower, *lossy), max(known.material.upper, *lossy))
         low, high = min(known.lower, *over), max(known.upper, *over)
         return replace(known, lower=low, upper=high, material=material, leads=Interval(min(by), max(by)))
 
@@ -303,13 +299,13 @@ def _free_sides(body: Body) -> str:
 def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:
     """Sensors by the ways to print it that have the least and the largest capacitance; None where one is not known."""
     body = model.body
-    at_rest: list[tuple[float, Body, RestState]] = [(model.sensor.capacitance_f(), body, model.rest)]
+    at_rest: list[tuple[float, Body, resting.RestState]] = [(model.sensor.capacitance_f(), body, model.rest)]
     for rule in list(body.cells.scenes)[1:]:
         with suppress(SensorgenError):  # as of a short, which the prediction tells by itself
             other = body.printed_otherwise(rule)
-            rest = rest_state(other, ranges=False)
+            rest = resting.rest_state(other, ranges=False)
             at_rest.append((rest.capacitance.value, other, rest))
-    ends: dict[int, tuple[Body, RestState]] = {}
+    ends: dict[int, tuple[Body, resting.RestState]] = {}
     for end in (min, max):
         value = end(c for c, *_ in at_rest)
         ends |= next({id(other): (other, rest)} for c, other, rest in at_rest if abs(c / value - 1) < _SAME)
@@ -331,7 +327,7 @@ def _other_films(model: SensorModel, load: Load, query: Query) -> Iterator[Senso
         yield _pressed(other, at_rest, model, load, query)
 
 
-def _pressed(other: Body, rest: RestState, model: SensorModel, load: Load, query: Query) -> Sensor | None:
+def _pressed(other: Body, rest: resting.RestState, model: SensorModel, load: Load, query: Query) -> Sensor | None:
     """Another body's sensor, its law at a few pressures or in the model's closed form; None where it is not known."""
     tip, name = query.tip_of(other.design), model.law.compression.name
     pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
@@ -511,9 +507,9 @@ def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
     yield from _ranges_assumed(body.design, model.values if model else ())
     if not body.is_drawn:
         yield "contacts between extruded lines cost no resistance: no source gives their resistivity"
-    gone = lost(body.design)
+    gone = resting.lost(body.design)
     given = " and ".join(f"{t.quantity} of {t.material}" for t in gone.taken)
-    unknown = f"a loss tangent of up to {LARGEST_TANGENT:g} in the range of Z alone: no source gives it"
+    unknown = f"a loss tangent of up to {resting.LARGEST_TANGENT:g} in the range of Z alone: no source gives it"
     if not gone.taken:
         yield f"no leak, and {unknown}"
     else:

@@ -14,16 +14,7 @@ from sensorgen.core.findings import Finding
 from sensorgen.core.records import adapter
 from sensorgen.core.units import si
 from sensorgen.design.values import ASSUMED, ENDS, MaterialValue
-from sensorgen.prediction.identifiability.results import (
-    CANNOT_LOCATE,
-    CANNOT_SENSE,
-    GUESS,
-    Identifiability,
-    StandardErrors,
-    metres,
-    newtons,
-    of_schema_1,
-)  # fmt: skip
+from sensorgen.prediction.identifiability import results as identified
 from sensorgen.prediction.plan import Plan, without_times
 
 _SHORT = 60  # characters that say what an assumption is, on a first screen
@@ -109,7 +100,9 @@ class Term:
     def wrong(self) -> list[str]:
         """Force and position by which a press is read wrongly, where these are more than nothing."""
         c = self.changes or Changes()
-        return [newtons(c.force_n)] * (c.force_n > _LEAST_N) + [metres(c.position_m)] * (c.position_m > _LEAST_M)
+        return [identified.newtons(c.force_n)] * (c.force_n > _LEAST_N) + [identified.metres(c.position_m)] * (
+            c.position_m > _LEAST_M
+        )
 
     def at_rest(self) -> str:
         """Changes of C and R in per cent, from a thousandth on."""
@@ -287,12 +280,12 @@ class UnderTop:
     force_resolution: Bounds | None = None
     position_resolution: Bounds | None = None
     sensitivity: Bounds | None = None
-    calibrated: StandardErrors | None = None
-    typical: StandardErrors | None = None
+    calibrated: identified.StandardErrors | None = None
+    typical: identified.StandardErrors | None = None
 
     def bench(self) -> tuple[Bounds | None, Bounds | None]:
         """Standard errors of force and position after known presses [N], [m]."""
-        known = self.calibrated or StandardErrors(sigma_force_n=None, sigma_position_m=None)
+        known = self.calibrated or identified.StandardErrors(sigma_force_n=None, sigma_position_m=None)
         return (
             on_bench(self.force_resolution, known.sigma_force_n),
             on_bench(self.position_resolution, known.sigma_position_m),
@@ -301,8 +294,10 @@ class UnderTop:
     def words(self, most_n: float = inf, length_m: float = inf) -> str:
         """Name, standard errors after known presses; what cannot be done up to a force [N] and over a length [m]."""
         force, position = self.bench()
-        known = ((force, "N", most_n, CANNOT_SENSE), (position, "m", length_m, CANNOT_LOCATE))
-        words = [si(b.value, u, 3) if b.value < GUESS * abs(most) else cannot for b, u, most, cannot in known if b]
+        known = ((force, "N", most_n, identified.CANNOT_SENSE), (position, "m", length_m, identified.CANNOT_LOCATE))
+        words = [
+            si(b.value, u, 3) if b.value < identified.GUESS * abs(most) else cannot for b, u, most, cannot in known if b
+        ]
         return f"{self.name} {', '.join(words)}"
 
 
@@ -377,7 +372,7 @@ class Prediction(Boundless, Displayed):
     force_resolution: Bounds | None = None
     position_resolution: Bounds | None = None
     tops: tuple[UnderTop, ...] = ()
-    identifiability: Identifiability | None = None
+    identifiability: identified.Identifiability | None = None
     budget: ErrorBudget | None = None
     plan: Plan | None = None
     values: tuple[MaterialValue, ...] = ()
@@ -412,8 +407,8 @@ class Prediction(Boundless, Displayed):
         (force, position), known = self.bench(), self.identifiability
         length_m = max(known.map.position_m, default=inf) if known else inf
         return (
-            resolved(force, self.force_n, CANNOT_SENSE, conditional=self.conditional),
-            resolved(position, length_m, CANNOT_LOCATE, conditional=self.conditional),
+            resolved(force, self.force_n, identified.CANNOT_SENSE, conditional=self.conditional),
+            resolved(position, length_m, identified.CANNOT_LOCATE, conditional=self.conditional),
         )
 
     def rests_on(self, verdict: str = "") -> tuple[str, ...]:
@@ -613,9 +608,9 @@ def resolved(error: Bounds | None, most: float, cannot: str, *, conditional: boo
     """
     if error is None:
         return "–"
-    if not (error.lower if conditional else error.value) < GUESS * most:
+    if not (error.lower if conditional else error.value) < identified.GUESS * most:
         return cannot
-    if not error.value < GUESS * most:
+    if not error.value < identified.GUESS * most:
         return f"{cannot}, at best {si(error.lower, error.unit, 2)}"
     if error.upper > most:
         error = replace(error, upper=most, open="upper")
@@ -701,8 +696,8 @@ def _of_schema_1(data: dict[str, Any]) -> Prediction:
         resistance={end: Bounds.of(ohm, "ohm") for end, ohm in data.get("electrode_resistance_ohm", {}).items()},
         corner_frequency=_old_bounds(data.get("corner_frequency_hz"), "Hz"),
         impedance=tuple(_old_impedance(tone) for tone in data.get("impedance_ohm", ())),
-        identifiability=of_schema_1(known), values=tuple(MaterialValue(**value) for value in data.get("values", ())),
-        assumptions=tuple(data.get("assumptions", ())),
+        identifiability=identified.of_schema_1(known), assumptions=tuple(data.get("assumptions", ())),
+        values=tuple(MaterialValue(**value) for value in data.get("values", ())),
     )  # fmt: skip
 
 
