@@ -39,7 +39,8 @@ from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.sweep import Sweep
 
 if TYPE_CHECKING:
-    from sensorgen.solvers.sheet import parts, solve
+    from sensorgen.solvers.sheet.parts import Port, Sheet
+    from sensorgen.solvers.sheet.solve import PressErrors
 
 _SEVERITIES = {"info": BLUE, "warning": ORANGE, "error": "#d1242f"}  # the most severe on top
 
@@ -175,9 +176,7 @@ def compression_figure(result: CompressionResult) -> Figure:
 _LEAST = 1 / 30  # of the error without information, at which the colours begin
 
 
-def sheet(
-    film: "parts.Sheet", bounds: Mapping[str, "solve.PressErrors"], ports: Mapping[str, Sequence["parts.Port"]]
-) -> Figure:
+def sheet(film: "Sheet", bounds: Mapping[str, "PressErrors"], ports: Mapping[str, Sequence["Port"]]) -> Figure:
     """Standard errors of x and y over the sheet, one column per set of contacts.
 
     The colours end at the error without a reading: of a uniform distribution over the sheet.
@@ -197,9 +196,7 @@ def sheet(
     return Figure("sheet", title, alt, {"": panels}, columns=len(bounds))
 
 
-def _port_panel(
-    film: "parts.Sheet", name: str, bounds: "solve.PressErrors", ports: Sequence["parts.Port"], row: int
-) -> Panel:
+def _port_panel(film: "Sheet", name: str, bounds: "PressErrors", ports: Sequence["Port"], row: int) -> Panel:
     none_mm = bounds.guess_m[row] / M_PER_MM
     sigma_mm = bounds.sigma(outline=True)[..., 1 + row].T / M_PER_MM
     shown = np.clip(sigma_mm, none_mm * _LEAST, none_mm)
