@@ -252,14 +252,14 @@ _EDGE = 0.45  # of the width: farthest that a tip is pressed off the middle
 
 
 def _exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Assumption]:
-    """What a reading depends on beside the press."""
+    """Assumptions about a reading beside the press."""
     effects = model.body.design.effects
     parts = _drift(effects, model.sensor), _memory(effects, reference), _tip(model, reference), _first_layer(model)
     return (one for one in chain(*parts) if one.sensors is None or one.sensors)
 
 
 def _read_off(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
-    """What the meter and the person who notes the press add."""
+    """Errors of the meter, and of the person who notes the press."""
     effects = model.body.design.effects
     if effects.meter:
         gain = Changes(*(effects.meter,) * 5)  # the same at rest: the press is read as it is

@@ -59,7 +59,7 @@ class Dispersed(Sensor):
 
 
 class Assumption(NamedTuple):
-    """What a term of the error budget rests on; the first three, ``source`` and ``at_least`` as of the term.
+    """Basis of a term of the error budget; the first three, ``source`` and ``at_least`` as of the term.
 
     ``sensors`` are those at the ends of its range, None where they are not known, and ``turns`` what it leads to beside
     their changes; ``factor`` and ``since_rest`` as of :meth:`ReferenceLoad.change`.

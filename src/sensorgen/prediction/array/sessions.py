@@ -264,8 +264,10 @@ def calibrated(sessions: Sequence[elements.ArraySession], form: "elements.LawFor
     off_pairs, mean_pairs = np.sum([pairs for *_, pairs in errors], 0).tolist()
     share = off_pairs / mean_pairs if mean_pairs > 0 else 0.0
     common = float(np.sqrt(max(share, 0.0) * (1 + 1 / len(sessions))))  # of one session more
-    off, mean, sigma = (np.concatenate(each) for each in list(zip(*errors, strict=True))[:3])
-    alike = np.concatenate([np.full(len(off), 1 / max(len(off), 1)) for off, *_ in errors])  # each session counts alike
+    offs, means, sigmas, _ = zip(*errors, strict=True)
+    off, mean, sigma = np.concatenate(offs), np.concatenate(means), np.concatenate(sigmas)
+    counts = [len(each) for each in offs]
+    alike = np.repeat(1 / np.maximum(counts, 1), counts)  # a long session counts no more than others
     names = sessions[0].names
     if not off.size:  # total forces alone: the parameters' covariance is what is known
         return ArrayCalibration(law, 0.0, 0.0, NORMAL_90, common, tares, quiet, names)
