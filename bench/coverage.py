@@ -22,7 +22,7 @@ import independent_sensor
 from independent_data import data_of, model_of, none_of
 from sensorgen.prediction.calibration.calibration import inside
 from sensorgen.prediction.calibration.fitting import Data, by_rest, calibrated, gain, rest_gain
-from sensorgen.prediction.calibration.inversion import OTHERWISE, Inverter, Verdict, doubt_rest
+from sensorgen.prediction.calibration.inversion import LOADED, OTHERWISE, Inverter, Verdict, doubt_rest
 from sensorgen.prediction.calibration.rest import Baseline
 from sensorgen.prediction.calibration.specimen import Presses
 from sensorgen.prediction.inverse.estimator import Estimator
@@ -141,9 +141,8 @@ def after(model, posterior, reference, strip, seed, where):
     base, averages = Baseline(model, posterior, reference), independent_sensor.AVERAGES
     changed = np.array([bool(base.change(z, strip.noise / averages**0.5)) for z in made.rest_ohm])
     known = posterior.presses > 0
-    inverter = Inverter(
-        model, posterior, force_limit_n=7.5 if known else 13.0, otherwise=OTHERWISE if known else 0.0
-    )  # fmt: skip
+    allowed = {"otherwise": OTHERWISE, "loaded": LOADED} if known else {}
+    inverter = Inverter(model, posterior, force_limit_n=7.5 if known else 13.0, **allowed)
     inverted = inverter.batch(unseen.ratio, changed=changed)
     doubt_rest(inverted, np.zeros(AFTER, bool), 0)
     ok = inverted.verdict == Verdict.OK

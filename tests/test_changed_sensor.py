@@ -10,9 +10,10 @@ from independent_sensor import CHANGES, LENGTH_M, TONES_HZ, WIDTH_M, Strip, draw
 from sensorgen.prediction.calibration import calibration as records
 from sensorgen.prediction.calibration.calibration import inside
 from sensorgen.prediction.calibration.fitting import by_rest, calibrated, gain, loosened, widened
-from sensorgen.prediction.calibration.inversion import OTHERWISE, Inverter, Verdict, doubt_rest
+from sensorgen.prediction.calibration.inversion import LOADED, OTHERWISE, Inverter, Verdict, doubt_rest
 from sensorgen.prediction.calibration.materials import MaterialEstimate
-from sensorgen.prediction.calibration.rest import Baseline, Rest
+from sensorgen.prediction.calibration.rest import LOADS_N, Baseline, Rest, load_probabilities
+from sensorgen.prediction.calibration.specimen import unknown
 
 NOISE, LIMIT_N, ANSWERED = 1e-3, 7.5, (Verdict.OK, Verdict.FORCE_ONLY)
 OMEGA = 2 * np.pi * TONES_HZ
@@ -48,7 +49,7 @@ def judged(model, specimen, seed, name, otherwise=OTHERWISE, count=60):
     made = run(next_day(change(strip, seed), seed), count, seed + 77, where)
     base = Baseline(model, posterior, gain(model, known, posterior.at))
     changed = np.array([bool(base.change(z, NOISE / 10**0.5)) for z in made.rest_ohm])
-    inverter = Inverter(model, posterior, force_limit_n=LIMIT_N, otherwise=otherwise)
+    inverter = Inverter(model, posterior, force_limit_n=LIMIT_N, otherwise=otherwise, loaded=LOADED)
     unseen = data_of(made, NOISE)
     found = inverter.batch(unseen.ratio, changed=changed)
     doubt_rest(found, np.zeros(count, bool), 0)
@@ -171,6 +172,49 @@ def test_readings_below_their_rest_put_their_neighbours_in_doubt(model, specimen
     found.below[:], found.verdict[:] = 0.0, Verdict.OK
     assert doubt_rest(found, rest, 20) == 0
     assert (found.verdict == Verdict.LOADED_REST).sum() == 19
+
+
+@pytest.mark.parametrize(
+    ("load_n", "zeros", "is_shown"), [(0.0, 0, False), (0.0, 60, False), (1.0, 0, True), (1.0, 60, True)]
+)
+def test_readings_below_their_rest_show_a_load_at_rest(load_n, zeros, is_shown):
+    """Forces up to 6 N, each read to 0.6 N, and readings of no force, which alone show no load."""
+    rng, per_n = np.random.default_rng(3), 1.7
+    force = np.concatenate([rng.uniform(0.1, 6.0, 400), np.zeros(zeros)])
+    below = per_n * (load_n - force) + rng.standard_normal(len(force))
+    chance = load_probabilities(np.append(below, np.nan), per_n * LOADS_N, LOADED)
+    assert chance.sum() == pytest.approx(1.0)
+    assert (chance[0] < 0.05) == is_shown
+    assert is_shown or chance[0] > 1 - LOADED
+    assert not is_shown or 0.7 < chance @ LOADS_N < 1.4
+
+
+def test_a_load_at_rest_widens_the_intervals_of_its_session_alone():
+    """Prints of blunt cells, of which 1 N at rest shifts C by 0.1 % or less; no reading alone shows it."""
+    model, held = model_of(printed=True), []
+    for seed in (100, 104, 109):
+        strip = drawn_at_random(seed, printed=True)
+        specimen = strip, (known := data_of(run(strip, 30, seed), NOISE)), calibrated(model, known)
+        blind, aware = (Inverter(model, specimen[2], force_limit_n=LIMIT_N, loaded=chance) for chance in (0.0, LOADED))
+        for name in ("sound", "rest read under 1 N"):
+            unseen = data_of(run(next_day(CHANGES[name][0](strip, seed), seed), 80, seed + 77), NOISE)
+            before, after = blind.batch(unseen.ratio), aware.batch(unseen.ratio)
+            if name == "sound":
+                assert (after.force_90_n == before.force_90_n).all()
+            else:
+                held.append([inside(found, unseen.presses)[0].mean() for found in (before, after)])
+    assert np.mean(held, 0)[0] < 0.65
+    assert np.mean(held, 0)[1] > 0.75
+
+
+def test_the_law_of_a_tip_over_an_end_is_that_of_its_pressure(model):
+    """Half of the tip under half of the force: half of the capacitance change, with the calibrated factors."""
+    at = np.where(np.char.startswith(model.names, "rise at"), 1.5, 0.0)
+    at[list(model.names).index("resistance")] = -20.0
+    force, place = np.array([1.0, 2.0, 6.0]), np.full(3, model.sensor.length_m / 2)
+    whole = np.expm1(-model.ratio(at, unknown(force, place)).real)
+    half = np.expm1(-model.ratio(at, unknown(force / 2, 2 * place)).real)
+    assert half == pytest.approx(whole / 2, rel=1e-4)
 
 
 def test_presses_near_an_end_may_lie_in_the_interval(model, specimens):
