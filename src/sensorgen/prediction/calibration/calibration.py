@@ -15,7 +15,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.models.compression import CapacitanceCurve, Plate
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.calibration.fitting import Data, Posterior, calibrated
-from sensorgen.prediction.calibration.inversion import LOADED, OTHERWISE, InvertedPresses, Inverter
+from sensorgen.prediction.calibration.inversion import OTHERWISE, InvertedPresses, Inverter
 from sensorgen.prediction.calibration.materials import Link, MaterialEstimate, estimate, source_text
 from sensorgen.prediction.calibration.rest import Baseline
 from sensorgen.prediction.calibration.specimen import FORCES_N, Presses, SpecimenModel, Spread
@@ -210,7 +210,7 @@ class Calibration:
         if noise is not None:
             known = replace(known, noise=np.broadcast_to(noise, known.noise.shape))
         otherwise = OTHERWISE if self.allowance else 0.0
-        return Inverter(self.model, known, prior, limit_n or self.limit_n, otherwise=otherwise, loaded=LOADED)
+        return Inverter(self.model, known, prior, limit_n or self.limit_n, otherwise=otherwise, session=True)
 
     @property
     def allowance(self) -> tuple[str, ...]:

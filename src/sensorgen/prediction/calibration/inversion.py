@@ -31,7 +31,11 @@ _PARTS = 3  # of a cell of the grid, over which the density falls
 _COARSEST = 4.0  # change of ln of the density over a cell from which on it counts as even there
 _FEW_TONES = 2
 OTHERWISE = 0.1  # probability, until a recheck, that something else than the press makes a part of the reading: a guess
-LOADED = 0.2  # probability, before any reading, that something lay on the sensor at rest: a guess
+_LOADED = 0.2  # probability, before any reading, that something lay on the sensor at rest: a guess
+_CONFINED = 0.2  # probability, before any reading, that a session's presses are all on a part of the sensor: a guess
+_STRETCHES = np.array([  # such parts, start and end over the length: places share errors, so that none is shorter
+    (0.0, 1.0), *((start, start + of) for of in (0.1, 0.2, 0.4, 0.6, 0.8) for start in np.arange(0, 1.01 - of, 0.05)),
+])  # fmt: skip
 _RARE = 0.005  # probability of a load at rest below which it is left out
 _BELOW = 0.3  # share of what lies outside an interval that is below it, where that something is allowed for
 _MORE = 3.2905267314919255  # standard deviations that noise exceeds once in a thousand
@@ -83,6 +87,8 @@ class InvertedPresses(Samples):
         Deviation there towards another capacitance elsewhere, in standard deviations [-].
     below : (n,) array
         Capacitance by which the reading lies below its reading at rest, in standard deviations [-].
+    stretches : (n, s) array
+        Probability of the reading under presses on a stretch of the sensor, over that under presses anywhere [-].
     tones : (n,) array
         Number of frequencies that count.
     verdict : (n,) array
@@ -96,6 +102,7 @@ class InvertedPresses(Samples):
     chi2: Real
     more: Real
     below: Real
+    stretches: Real
     tones: Index
     verdict: NDArray[np.uint8]
 
@@ -107,6 +114,8 @@ class _Readings(NamedTuple):
     ----------
     parts : (n, 2 m) array
         Of ln of the ratio.
+    on_stretch : (n, s) array
+        Factor on the probability of places on each stretch of the sensor.
     chance : (k,) array
         Probability of each load.
     by_load : (k, 2 m) array
@@ -114,8 +123,13 @@ class _Readings(NamedTuple):
     """
 
     parts: Real
+    on_stretch: Real
     chance: Real
     by_load: Real
+
+    def rows(self, which: Index) -> "_Readings":
+        """Some of the readings."""
+        return self._replace(parts=self.parts[which], on_stretch=self.on_stretch[which])
 
 
 class _Table(NamedTuple):
@@ -158,8 +172,9 @@ class Inverter:
         Probability that the press makes a share of a reading alone [-]: the sensor is softer or the tip wider than in
         the calibration, or something else is there, and the frequencies do not separate these. The share is below s
         with the probability sqrt(s).
-    loaded : float
-        Probability that something lay on the sensor at rest [-]; allowed for where the readings of a batch raise it.
+    session : bool
+        A batch is of one session: all of its readings together tell whether something lay on the sensor at rest, and,
+        for the force, on which part of the sensor all presses are. Readings that tell neither are as apart.
 
     Attributes
     ----------
@@ -172,9 +187,9 @@ class Inverter:
     def __init__(
         self, model: SpecimenModel, posterior: Posterior, prior: Prior | None = None,
         force_limit_n: float = FORCE_LIMIT_N, level: float = LEVEL, otherwise: float = 0.0,
-        loaded: float = 0.0,
+        session: bool = False,
     ) -> None:  # fmt: skip
-        self.level, self._otherwise, self._loaded = level, otherwise, loaded
+        self.level, self._otherwise, self._session = level, otherwise, session
         self._posterior, self._length = posterior, model.sensor.length_m
         coarse = np.linspace(0, 1, _COARSE[0]) ** 2 * force_limit_n, np.linspace(0, self._length, _COARSE[1])
         mean, covariance = readings(model, posterior, *coarse)
@@ -196,6 +211,7 @@ class Inverter:
         self._fall = weighted / np.sqrt(fall @ weighted)
         by_load = parts(model.ratio(posterior.at, at_rest))
         self._by_load = by_load - by_load[0]
+        self._stretches = _stretches(_edges(self.position_m) / self._length)
 
     def batch(self, ratio: Complex, rest_age_s: Real | None = None, changed: Mask | None = None) -> InvertedPresses:
         """Presses behind readings.
@@ -219,8 +235,18 @@ class Inverter:
             raise BadInput(f"readings of shape {ratio.shape}; expected (n, {m}), a column for each calibrated tone")
         measured = np.isfinite(ratio)
         below = parts(ratio) @ self._fall
-        readings = self._with_rest(parts(ratio), below)
+        anywhere = np.eye(1, len(_STRETCHES)).repeat(len(ratio), 0)
+        readings = _Readings(parts(ratio), anywhere, np.ones(1), self._by_load[:1])
+        session = self._session and len(ratio) > 1
+        if session and (below > 0).any():
+            readings = self._with_rest(readings, below)
         presses = self._by_tones(readings, measured, _FEW_TONES)
+        if session:
+            fits = presses.chi2 <= chi2_limit(2 * presses.tones - 2)
+            chance = _stretch_probabilities(presses.stretches[fits])
+            if chance[0] < 1 - _CONFINED:
+                readings = readings._replace(on_stretch=chance / np.maximum(presses.stretches, 1e-300))
+                presses = self._by_tones(readings, measured, _FEW_TONES)
         bad = np.flatnonzero(~_one_press(presses) & ~_more(presses))
         if bad.size:
             self._without_one(presses, bad, readings, measured)
@@ -228,14 +254,13 @@ class Inverter:
         stale = np.zeros(len(ratio), bool) if rest_age_s is None else ~(rest_age_s <= STALE_S)
         return self._judged(presses, stale, np.zeros(len(ratio), bool) if changed is None else changed)
 
-    def _with_rest(self, ratio: Real, below: Real) -> _Readings:
-        """Readings (n, 2 m) with the loads at rest that those below it show."""
-        if self._loaded and (below > 0).any():
-            chance = load_probabilities(below, -self._by_load @ self._fall, self._loaded)
-            if chance[0] < 1 - self._loaded:
-                order = np.argsort(chance)[np.sort(chance) > _RARE]
-                return _Readings(ratio, chance[order], self._by_load[order])
-        return _Readings(ratio, np.ones(1), self._by_load[:1])
+    def _with_rest(self, readings: _Readings, below: Real) -> _Readings:
+        """Readings with the loads at rest that those below it show."""
+        chance = load_probabilities(below, -self._by_load @ self._fall, _LOADED)
+        if chance[0] >= 1 - _LOADED:
+            return readings
+        order = np.argsort(chance)[np.sort(chance) > _RARE]
+        return readings._replace(chance=chance[order], by_load=self._by_load[order])
 
     def _by_tones(self, readings: _Readings, measured: Mask, fewest: int) -> InvertedPresses:
         """Presses behind readings of which at least so many tones were measured (n, m)."""
@@ -250,7 +275,7 @@ class Inverter:
         table = self._table(tones, columns)
 
         def put(some: Index) -> None:
-            block = self._block(readings._replace(parts=readings.parts[some]), table, columns)
+            block = self._block(readings.rows(some), table, columns)
             presses.put(some, replace(block, tones=np.full(len(some), tones.sum())))
 
         blocks = [rows[start : start + _BLOCK] for start in range(0, len(rows), _BLOCK)]
@@ -262,7 +287,7 @@ class Inverter:
 
     def _without_one(self, presses: InvertedPresses, rows: Index, readings: _Readings, measured: Mask) -> None:
         """Of readings that no press explains, leave out the tone whose absence explains the most."""
-        best, bad = nothing(len(rows)), readings._replace(parts=readings.parts[rows])
+        best, bad = nothing(len(rows)), readings.rows(rows)
         for tone in range(measured.shape[1]):
             left = measured[rows]
             left[:, tone] = False
@@ -288,12 +313,14 @@ class Inverter:
             table.more[fresh] = self._towards_more(table.root.reshape(-1, k, k)[fresh], fresh, columns)
         more = np.abs(np.einsum("nk,nk->n", table.more[best], white[best, :, each]))
         shaped = density.reshape(len(self.force_n), len(self.position_m), -1)
-        force, position = _finer(self.force_n, shaped.sum(1)), _finer(self.position_m, shaped.sum(0))
+        by_place = shaped.sum(0)
+        by_force = np.einsum("fxn,nx->fn", shaped, readings.on_stretch @ self._stretches)
+        force, position = _finer(self.force_n, by_force), _finer(self.position_m, by_place)
         return replace(
             nothing(len(each)),
             force_n=_quantiles(*force, (0.5,))[:, 0], force_90_n=self._force_ends(*force),
             position_m=_quantiles(*position, (0.5,))[:, 0], position_90_m=_densest(*position, self.level),
-            chi2=chi2[best, each], more=more,
+            chi2=chi2[best, each], more=more, stretches=by_place.T @ self._stretches.T,
         )  # fmt: skip
 
     def _force_ends(self, edges: Real, force: Real) -> Real:
@@ -387,7 +414,23 @@ def nothing(n: int) -> InvertedPresses:
     """Results of readings in which nothing was found yet."""
     (force, place, *others), ends = np.full((5, n), np.nan), np.full((2, n, 2), np.nan)
     tones, verdict = np.zeros(n, np.intp), np.full(n, Verdict.MISSING, np.uint8)
-    return InvertedPresses(force, place, ends[0], ends[1], others[0], others[1], others[2], tones, verdict)
+    stretches = np.full((n, len(_STRETCHES)), np.nan)
+    return InvertedPresses(force, place, ends[0], ends[1], others[0], others[1], others[2], stretches, tones, verdict)
+
+
+def _stretches(edges: Real) -> Real:
+    """Density of places on each stretch over that on all of the sensor (s, x), in cells between borders (x + 1,)."""
+    start, end = _STRETCHES.T[:, :, None]
+    within = np.maximum(np.minimum(edges[1:], end) - np.maximum(edges[:-1], start), 0.0)
+    return np.asarray(within / (end - start) / np.diff(edges))
+
+
+def _stretch_probabilities(likely: Real) -> Real:
+    """Probabilities that a session's presses are on all of the sensor, and on each stretch (s,), of readings (n, s)."""
+    ln = np.log(np.maximum(likely, 1e-300)).sum(0)
+    before = np.append(1 - _CONFINED, np.full(len(ln) - 1, _CONFINED / (len(ln) - 1)))
+    chance = before * np.exp(ln - ln.max())
+    return np.asarray(chance / chance.sum())
 
 
 def _position_errors(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> Real:
