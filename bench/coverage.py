@@ -197,11 +197,10 @@ def changes_text(specimens):
         "\n\nAt 0.1 % noise the frequencies cannot tell one press from two, or from a hand: their second-order "
         "difference is below 0.03 % of Z. At 0.01 % on electrodes of 50 kohm half to four fifths of them are seen as "
         "more than one press. A rest read under 1 N shifts C of a blunt print by 0.07 %: less than a day does; the "
-        "readings of a session that lie below it show it together. At the end half of the tip presses twice as hard and "
-        "C of a sharp cell rises less: one reading tells the place to 67 mm, those of a session together that all are "
-        "there. After a "
-        "recheck by 5 presses the sound sensor's median width is 1.2 N as drawn and 1.9 N as printed, covered by 0.94 "
-        "to 0.95; softened by 1.4, 1.0 and 1.6 N, 0.94 to 0.96.\n"
+        "readings of a session that lie below it show it together. At the end half of the tip presses twice as hard "
+        "and C of a sharp cell rises less: one reading tells the place to 67 mm, those of a session together that all "
+        "are there. After a recheck by 5 presses the sound sensor's median width is 1.2 N as drawn and 1.9 N as "
+        "printed, covered by 0.94 to 0.95; softened by 1.4, 1.0 and 1.6 N, 0.94 to 0.96.\n"
     )
     return head + "\n".join(rows) + foot
 
