@@ -240,16 +240,12 @@ class Inverter:
         session = self._session and len(ratio) > 1
         if session and (below > 0).any():
             readings = self._with_rest(readings, below)
-        presses = self._by_tones(readings, measured, _FEW_TONES)
+        presses = self._inverted(readings, measured)
         if session:
-            fits = presses.chi2 <= chi2_limit(2 * presses.tones - 2)
-            chance = _stretch_probabilities(presses.stretches[fits])
+            chance = _stretch_probabilities(presses)
             if chance[0] < 1 - _CONFINED:
-                readings = readings._replace(on_stretch=chance / np.maximum(presses.stretches, 1e-300))
-                presses = self._by_tones(readings, measured, _FEW_TONES)
-        bad = np.flatnonzero(~_one_press(presses) & ~_more(presses))
-        if bad.size:
-            self._without_one(presses, bad, readings, measured)
+                factors = chance / np.maximum(presses.stretches, 1e-300)
+                presses = self._inverted(readings._replace(on_stretch=factors), measured)
         presses.below[:] = below
         stale = np.zeros(len(ratio), bool) if rest_age_s is None else ~(rest_age_s <= STALE_S)
         return self._judged(presses, stale, np.zeros(len(ratio), bool) if changed is None else changed)
@@ -261,6 +257,14 @@ class Inverter:
             return readings
         order = np.argsort(chance)[np.sort(chance) > _RARE]
         return readings._replace(chance=chance[order], by_load=self._by_load[order])
+
+    def _inverted(self, readings: _Readings, measured: Mask) -> InvertedPresses:
+        """Presses behind readings by their measured tones (n, m), without one of them where no press explains all."""
+        presses = self._by_tones(readings, measured, _FEW_TONES)
+        bad = np.flatnonzero(~_one_press(presses) & ~_more(presses))
+        if bad.size:
+            self._without_one(presses, bad, readings, measured)
+        return presses
 
     def _by_tones(self, readings: _Readings, measured: Mask, fewest: int) -> InvertedPresses:
         """Presses behind readings of which at least so many tones were measured (n, m)."""
@@ -425,9 +429,10 @@ def _stretches(edges: Real) -> Real:
     return np.asarray(within / (end - start) / np.diff(edges))
 
 
-def _stretch_probabilities(likely: Real) -> Real:
-    """Probabilities that a session's presses are on all of the sensor, and on each stretch (s,), of readings (n, s)."""
-    ln = np.log(np.maximum(likely, 1e-300)).sum(0)
+def _stretch_probabilities(presses: InvertedPresses) -> Real:
+    """Probabilities that the presses of a session are on all of the sensor, and on each stretch (s,)."""
+    fits = presses.chi2 <= chi2_limit(2 * presses.tones - 2)
+    ln = np.log(np.maximum(presses.stretches[fits], 1e-300)).sum(0)
     before = np.append(1 - _CONFINED, np.full(len(ln) - 1, _CONFINED / (len(ln) - 1)))
     chance = before * np.exp(ln - ln.max())
     return np.asarray(chance / chance.sum())
