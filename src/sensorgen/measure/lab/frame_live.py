@@ -18,7 +18,7 @@ from typing import IO, TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Mask, Real, Whole
-from sensorgen.core.errors import BadInput, MissingValue
+from sensorgen.core.errors import BadInput, library
 from sensorgen.core.files import reading
 from sensorgen.measure.array_frames import HDF, swapped
 from sensorgen.measure.lab.devices import Clock, DeviceFault, FrameMeter
@@ -57,7 +57,7 @@ def recorder(path: Path, shape: tuple[int, int], frequency_hz: float) -> FrameFi
     ------
     BadInput
         The file exists, or its name ends otherwise.
-    MissingValue
+    NotInstalled
         HDF5 without h5py.
     """
     if there := [one for one in (path, _part(path)) if one.exists()]:
@@ -92,10 +92,7 @@ class _Hdf:
     """HDF5 that grows."""
 
     def __init__(self, path: Path, shape: tuple[int, int], frequency_hz: float) -> None:
-        try:
-            import h5py
-        except ImportError:
-            raise MissingValue("HDF5 needs h5py: pip install h5py, or record as .csv or .npz") from None
+        h5py = library("h5py", "HDF5 needs h5py: pip install h5py, or record as .csv or .npz")
         self._file = h5py.File(path, "w")
         self._file["frequency_hz"] = frequency_hz
         for name, dtype, part in (("siemens", _COMPLEX, shape), ("time_s", float, ()), ("rest", np.uint8, ())):

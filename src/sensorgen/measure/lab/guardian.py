@@ -17,9 +17,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
-from typing import IO, Any, Self, cast
+from typing import IO, Any, cast
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.records import Strict
@@ -54,7 +54,7 @@ class Orders(Strict):
     folder: str
 
 
-class Guardian:
+class Guardian(AbstractContextManager["Guardian", None]):
     """The guardian as its run sees it; use it in a ``with`` statement.
 
     Parameters
@@ -93,9 +93,6 @@ class Guardian:
     def pid(self) -> int:
         """Number of its process."""
         return self._process.pid
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
