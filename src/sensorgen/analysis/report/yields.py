@@ -160,37 +160,24 @@ def _name(group: Group) -> str:
     return ", ".join(map(str, group.key))
 
 
-def notes(comparison: Comparison) -> tuple[str, ...]:
-    """Notes on the rules of verdicts and counts."""
-    how = (
-        "The verdict is the gravest of the electrode's and the film's. An electrode is compared with its prediction "
-        "times the median of measured over predicted of its shape's readings within their predicted ranges, if any. "
-        "A film resistance up to that of two electrodes in series is a short. A film is intact from "
-        f"{REACTANCES:g} times its predicted reactance at {TONES_HZ[0] / 1e3:g} kHz on, where a leak changes the "
-        f"impedance by {50 / REACTANCES**2:g} %, or from the meter's highest range on; between, it leaks."
-    )
-    if len(comparison.last) == 1:
-        return (how,)
-    earlier = len(comparison.direct) - len(comparison.last)
-    more = f"; {earlier} earlier readings are not counted" if earlier else ""
-    return (
-        how,
-        f"Each specimen counts once, with its last reading{more}. Specimens shorted by design have a verdict, but "
-        "count for no share. Intervals are Clopper's and Pearson's, wider where plates differ (Korn and Graubard). "
-        "Differences between films and between shapes are "
-        f"tested (Fisher; Freeman and Halton) and affirmed below p = {DIFFER:g}; every other comparison of groups is "
-        "exploratory.",
-    )
+def notes(comparison: Comparison, texts: Sequence[str]) -> Iterator[str]:
+    """Notes on the rules of verdicts and, where there are several specimens, of counts."""
+    count = len(comparison.direct) - len(comparison.last)
+    earlier = f"; {count} earlier readings are not counted" if count else ""
+    for text in texts[: 1 if len(comparison.last) == 1 else None]:
+        yield text.format(
+            reactances=REACTANCES, khz=TONES_HZ[0] / 1e3, change_percent=50 / REACTANCES**2, earlier=earlier,
+            differ=DIFFER,
+        )  # fmt: skip
 
 
-def parts(comparison: Comparison, *, brief: bool) -> tuple[Part, ...]:
-    """Tables of verdicts, with notes unless they are to be brief; nothing without DC readings."""
+def parts(comparison: Comparison, texts: Sequence[str]) -> tuple[Part, ...]:
+    """Tables of verdicts, with notes; nothing without DC readings."""
     if not comparison.direct:
         return ()
     tables = [table(comparison)] if len(comparison.last) > 1 else []
-    if directions := rows(comparison):
-        tables.append(Table.of("direction", "Electrode resistance by direction of the cogs", directions))
-    return (*tables, reasons(comparison), *(() if brief else notes(comparison)))
+    directions = Table.some("direction", "Electrode resistance by direction of the cogs", rows(comparison))
+    return (*tables, *directions, reasons(comparison), *notes(comparison, texts))
 
 
 def table(comparison: Comparison) -> Table:
