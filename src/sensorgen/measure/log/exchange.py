@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from sensorgen.core import files as store
+from sensorgen.core import yamlfile
 from sensorgen.core.display import escaped, harmless
 from sensorgen.core.document import Part, spreadsheet
 from sensorgen.core.errors import BadInput, UnknownName, library, within
@@ -218,14 +219,7 @@ def _pyarrow() -> Any:
 
 MOST_BYTES = 64_000_000
 THESIS = "thesis Table D.1"
-NAMES = {  # our columns, and names that are recognised
-    "specimen": ("specimen", "design", "name", "name_raw", "sensor", "sample", "written"),
-    "y": ("y", "ry", "r_y", "resistance in y", "resistance y", "y_words"),
-    "z": ("z", "rz", "r_z", "resistance in z", "resistance z", "z_words"),
-    "remark": ("remark", "remarks", "comment", "comments"),
-    "baked": ("baked",),
-    "measured_at": ("measured_at", "date", "time", "measured"),
-}
+NAMES = yamlfile.read(Path(__file__).with_name("columns.yaml"))
 _TRUTH = {"": None, "yes": True, "true": True, "1": True, "baked": True, "no": False, "false": False, "0": False,
           "unbaked": False, "not baked": False}  # fmt: skip
 

@@ -25,8 +25,8 @@ MARKS = (
 """Marks of samples."""
 # zero: a tone is exactly 0 + 0j, as where the instrument skipped a block; missing: a tone is no finite number, or
 # beyond any impedance (1e30 ohm); transient: the demodulator was still starting up; clipped: the input was beyond its
-# range; invalid: the file says so; gap: the first after samples that were lost; stamps: earlier than the one before, the
-# same, no finite number; rig error: the rig reported an error, or nothing.
+# range; invalid: the file says so; gap: the first after samples that were lost; stamps: earlier than the one before,
+# the same, no finite number; rig error: the rig reported an error, or nothing.
 
 HARMLESS = frozenset({"gap", "reversed stamp", "repeated stamp", "no stamp"})
 """Marks that leave a sample valid: the rebuilt clock corrects them."""
