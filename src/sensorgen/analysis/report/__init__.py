@@ -375,11 +375,6 @@ def pieces(content: Report, how: str) -> Iterator[str]:
     return _WRITERS[how](content)
 
 
-def written(content: Report, how: str) -> str:
-    """A report as text; parameters as :func:`pieces`."""
-    return "".join(pieces(content, how))
-
-
 _WRITERS = {"html": html, "md": markdown, "csv": comma_separated, "json": as_json}
 FORMATS = tuple(_WRITERS)
 
