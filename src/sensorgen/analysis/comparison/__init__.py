@@ -237,7 +237,7 @@ def _first(left_out: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
 def _printed(log: Log, left_out: list[tuple[str, str]]) -> dict[str, Print]:
     """The latest print of each specimen; one that two machines have bound to different designs is left out."""
     latest: dict[str, Print] = {}
-    for row in log.prints():
+    for row in log.entries(Print):
         before = latest.setdefault(row.specimen, row)
         if before.design_id != row.design_id:
             both = f"{before.design} ({before.design_id}) and {row.design} ({row.design_id})"

@@ -117,11 +117,6 @@ class Predicted:
         return complex(re.value, im.value), complex(re.lower, im.upper), complex(re.upper, im.lower)
 
     @property
-    def reason(self) -> str:
-        """Why there is no capacitance."""
-        return self.prediction.reason
-
-    @property
     def provenance(self) -> str:
         """Where the prediction comes from, in words."""
         if self.stored_at:

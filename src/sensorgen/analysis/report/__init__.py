@@ -403,7 +403,7 @@ def _drawings(comparison: Comparison) -> tuple[Drawing, ...]:
         r, c = of.ry_ohm, of.prediction.capacitance
         words = (
             f"electrode resistance {r.words() if r else 'unknown'}",
-            f"capacitance {c.words()}" if c else f"no capacitance: {of.reason}",
+            f"capacitance {c.words()}" if c else f"no capacitance: {of.prediction.reason}",
             of.provenance,
         )
         sheets.append(Drawing(name, design.id(), draw(design, reviewed(design)), "; ".join(words)))
@@ -417,7 +417,7 @@ def identifiability(comparison: Comparison) -> tuple[Table, ...]:
         card = of.prediction.identifiability
         force, place, together = _known(card)
         bench_force, bench_place, _ = _known(card and card.calibrated)
-        verdict = card.verdict if card else of.reason or "no prediction"
+        verdict = card.verdict if card else of.prediction.reason or "no prediction"
         rows.append(IdentifiabilityRow(name, force, place, together, bench_force, bench_place, verdict))
     caption = f"Standard errors of {FORCE_N:g} N in the middle, predicted, by seven frequencies (Cramér-Rao)"
     return Table.some("identifiability", caption, rows)
