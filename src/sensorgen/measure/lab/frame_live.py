@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Protocol
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,22 +35,12 @@ _CHUNK = 64  # frames
 _COMPLEX = np.complex64  # seven digits, as of the stream
 
 
-class FrameFile(Protocol):
-    """File of frames."""
-
-    def add(self, siemens: Complex, time_s: Real, rest: Mask) -> None:
-        """Append frames, (k, m, n)."""
-
-    def close(self) -> None:
-        """Complete the file."""
-
-
 def _part(path: Path) -> Path:
     """File with the frames of an NPZ until it is packed; what a killed run leaves."""
     return path.with_name(path.name + ".part")
 
 
-def recorder(path: Path, shape: tuple[int, int], frequency_hz: float) -> FrameFile:
+def recorder(path: Path, shape: tuple[int, int], frequency_hz: float) -> "FrameFile":
     """A new file of frames, of the kind that its name ends in.
 
     Raises
@@ -136,6 +126,7 @@ class _Packed:
             self._part.unlink()
 
 
+FrameFile = _Csv | _Hdf | _Packed
 REST_S = 1.0  # that a command marks as unloaded
 _WAITING = 128  # frames
 _IDLE_S = 0.005
@@ -165,7 +156,7 @@ class FrameFeed:
 
     meter: FrameMeter
     clock: Clock
-    recorder: "FrameFile | None" = None
+    recorder: FrameFile | None = None
     unloaded_s: float = 0.0
     recording: bool = True
     paused: bool = False

@@ -156,15 +156,6 @@ class Recording:
         every = blank(count) | by.marks | sifted(impedance_ohm) | marks
         return cls(by.time_s, tones_hz, impedance_ohm, every, by.clock, source)
 
-    @property
-    def epoch_s(self) -> float:
-        """Real time at ``time_s`` = 0, in seconds since 1970; nan if unknown [s]."""
-        return self.clock.epoch_s
-
-    def real_s(self) -> Real:
-        """Seconds since 1970 of every sample; nan if unknown [s]."""
-        return self.clock.real_s(self.time_s)
-
     def counts(self) -> dict[str, int]:
         """Number of samples, of valid samples, and of samples with each mark."""
         marked = {name: int(np.count_nonzero(which)) for name, which in self.marks.items()}

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from math import copysign, exp, inf, sqrt
 from pathlib import Path
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -70,18 +70,6 @@ class Planted(Strict):
         return self
 
 
-class Faulty(Protocol):
-    """A simulator that faults strike.
-
-    Attributes
-    ----------
-    fault : str
-        Name of its fault, "" for none.
-    """
-
-    fault: str
-
-
 class FaultSchedule:
     """Faults that wait for their time, and those that last.
 
@@ -94,10 +82,10 @@ class FaultSchedule:
     def __init__(self, planted: Iterable[Planted]) -> None:
         self._waiting = list(planted)
         self._lasting: list[tuple[float, Fault]] = []
-        self._targets: dict[str, Faulty] = {}
+        self._targets: dict[str, Any] = {}
 
-    def attach(self, strikes: Strikes, simulator: Faulty) -> None:
-        """Name the simulator that faults of a kind of device strike."""
+    def attach(self, strikes: Strikes, simulator: Any) -> None:
+        """Name the simulator that faults of a kind of device strike: they set its attribute ``fault``."""
         self._targets[strikes] = simulator
 
     def update(self, time_s: float, force_n: float) -> None:
