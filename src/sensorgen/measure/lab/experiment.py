@@ -324,12 +324,7 @@ def read(path: Path) -> Experiment:
         A file that cannot be read, or a key that is unknown, missing or of another kind, with file and key.
     """
     with within(str(path)):
-        return parse(yamlfile.read(path))
-
-
-def parse(data: Any) -> Experiment:
-    """An experiment from plain data; errors as :func:`read`."""
-    return checked(Experiment, data)
+        return checked(Experiment, yamlfile.read(path))
 
 
 def from_json(data: Any) -> Experiment:
