@@ -104,8 +104,8 @@ def noisy(seed, nu):
 def test_the_tangent_is_the_derivative_of_the_residual_and_that_of_the_energy():
     e, u, inner, du, di = noisy(1, 0.49)
     h, along = 1e-6, np.concatenate([du[e.freedoms], di], axis=1)
-    (up, _), (down, _) = (e.full(u + s * du, inner.moved(di, s)) for s in (h, -h))
-    residual, matrix = e.full(u, inner)
+    up, down = (e.residual(u + s * du, inner.moved(di, s)) for s in (h, -h))
+    residual, matrix = e.residual(u, inner), e.derivative(u, inner)
     expected = np.einsum("mij,mj->mi", matrix, along)
     assert (up - down) / (2 * h) == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
     assert matrix == pytest.approx(matrix.transpose(0, 2, 1), abs=1e-9 * np.abs(matrix).max())

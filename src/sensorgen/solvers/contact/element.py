@@ -195,26 +195,36 @@ class Inner:
 
 
 @dataclass(frozen=True)
-class Tangent:
-    """Condensed stiffness (m, k, k) and force (m, k); the inner step is ``offset - slope @ du``.
+class Unbalanced:
+    """Condensed force (m, k), step of the inner unknowns (m, 2d + 1) to their own equilibrium, and its size.
 
-    ``pressure_step`` is the distance of the pressures from their own equilibrium.
+    The imbalance is the largest step of a pressure over mu [-].
     """
 
-    stiffness: Real
     force: Real
-    offset: Real
+    step: Real
+    imbalance: float
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """Condensed stiffness (m, k, k), and what condenses a residual: slope (m, i, k), inverse (m, i, i)."""
+
+    stiffness: Real
     slope: Real
-    pressure_step: Real
-    mu_pa: Real
+    inverse: Real
 
-    def imbalance(self) -> float:
-        """Distance of the inner unknowns from their own equilibrium: largest pressure step over mu [-]."""
-        return float(np.abs(self.pressure_step / self.mu_pa[:, None]).max())
+    def condensed(self, residual: Real, mu_pa: Real) -> Unbalanced:
+        """What a residual (m, k + i) leaves, of the tangent's own state or one nearby; ``mu_pa`` (m,) [Pa]."""
+        outer, inner = self.slope.shape[2], self.slope.shape[1]
+        inside = residual[:, outer:, None]
+        force = residual[:, :outer] - np.matmul(self.slope.transpose(0, 2, 1), inside)[..., 0]
+        step = -np.matmul(self.inverse, inside)[..., 0]
+        return Unbalanced(force, step, float(np.abs(step[:, inner // 2 :] / mu_pa[:, None]).max()))
 
-    def inner_step(self, du: Real) -> Real:
-        """Step of inner node and pressure for a step of the other nodes (m, k)."""
-        return np.asarray(self.offset - np.einsum("mij,mj->mi", self.slope, du))
+    def inner_step(self, unbalanced: Unbalanced, du: Real) -> Real:
+        """Step of the inner unknowns (m, 2d + 1) for a step of the other nodes (m, k)."""
+        return np.asarray(unbalanced.step - np.matmul(self.slope, du[..., None])[..., 0])
 
 
 @dataclass(frozen=True)
@@ -223,7 +233,6 @@ class Elements:
 
     mesh: ElementMesh
     law: ElementMaterial
-    _last: list[tuple[Real, Inner, Tangent]] = field(default_factory=list, repr=False, compare=False)
 
     @cached_property
     def freedoms(self) -> Whole:
@@ -288,34 +297,46 @@ class Elements:
         return float((self._weights * (shape + p * (j - 1) - 0.5 * p**2 * self.law.compliance_per_pa[:, None])).sum())
 
     def tangent(self, u: Real, inner: Inner) -> Tangent:
-        """Condensed residual and its derivative at a state whose J is above 0; the last one is kept."""
-        if not (self._last and self._last[0][0] is u and self._last[0][1] is inner):
-            parts = list(self._condensed(u, inner))
-            tangent = Tangent(*(np.concatenate([getattr(p, key.name) for p in parts]) for key in fields(Tangent)))
-            self._last[:] = [(u, inner, tangent)]
-        return self._last[0][2]
+        """Derivative of the residual, condensed, at a state whose J is above 0."""
+        parts = list(self._condensed(u, inner))
+        return Tangent(*(np.concatenate([getattr(p, key.name) for p in parts]) for key in fields(Tangent)))
 
     def _condensed(self, u: Real, inner: Inner) -> Iterator[Tangent]:
         """Eliminate inner node and pressure, some elements at a time."""
         outer, pressures = self.freedoms.shape[1], inner.pressure.shape[1]
         step = max(_CHUNK // (outer + inner.bubble.shape[1] + pressures) ** 2, 1)
         for k in range(0, len(self.freedoms), step):
-            here = slice(k, k + step)
-            residual, matrix = self.full(u, inner, here)
-            inside = np.concatenate([matrix[:, outer:, :outer], residual[:, outer:, None]], axis=2)
-            solved = np.linalg.inv(matrix[:, outer:, outer:]) @ inside  # small ones: sooner than solving
-            taken = np.matmul(matrix[:, :outer, outer:], solved)
-            yield Tangent(
-                matrix[:, :outer, :outer] - taken[..., :-1],
-                residual[:, :outer] - taken[..., -1],
-                -solved[..., -1],
-                solved[..., :-1],
-                -solved[:, -pressures:, -1],
-                self.law.mu_pa[here],
-            )
+            matrix = self.derivative(u, inner, slice(k, k + step))
+            inverse = np.asarray(np.linalg.inv(matrix[:, outer:, outer:]), float)  # small ones: sooner than solving
+            slope = np.matmul(inverse, matrix[:, outer:, :outer])
+            yield Tangent(matrix[:, :outer, :outer] - np.matmul(matrix[:, :outer, outer:], slope), slope, inverse)
 
-    def full(self, u: Real, inner: Inner, which: slice = slice(None)) -> tuple[Real, Real]:
-        """Residual (m, k) and its derivative (m, k, k) before condensation: displacements, inner node, pressures."""
+    def residual(self, u: Real, inner: Inner) -> Real:
+        """Unbalanced forces of all nodes, and errors of the pressures (m, k), before condensation."""
+        every, table = slice(None), self.mesh.reference
+        h, w, mu = self._stretch(u, inner, every), self._weights, self.law.mu_pa[:, None]
+        (m, d), n = (len(h), h.shape[-1]), table.gradients.shape[1]
+        p = inner.pressure @ table.pressures.T
+        j, rate = determinant(h) / self._volumes[:, None], cofactor(h) / self._volumes[:, None, None, None]
+        t, hoops = self._hoops(u, inner, every) if self.mesh.turned else (1.0, None)
+        stress = (w * mu)[..., None, None] * (h @ self._metric[:, None]) + (w * (p * t - mu / j))[
+            ..., None, None
+        ] * rate
+        forces = (stress.transpose(0, 2, 1, 3).reshape(m * d, -1) @ table.flat).reshape(m, d, n)
+        if hoops is not None:
+            forces[:, 0] += np.matmul((w * (mu * t + p * j - mu / t))[:, None], hoops)[:, 0]
+        compressed = np.matmul(self._masses, inner.pressure[..., None])[..., 0] * self.law.compliance_per_pa[:, None]
+        swollen = (w * (j * t - 1)) @ table.pressures - compressed
+        return np.concatenate([forces.transpose(0, 2, 1).reshape(m, -1), swollen], axis=1)
+
+    @cached_property
+    def _masses(self) -> Real:
+        """Integrals of products of two functions of the pressure (m, d + 1, d + 1) [m^d]."""
+        pressures = self.mesh.reference.pressures
+        return np.asarray(np.einsum("mq,qi,qk->mik", self._weights, pressures, pressures))
+
+    def derivative(self, u: Real, inner: Inner, which: slice = slice(None)) -> Real:
+        """Derivative of the residual (m, k, k) before condensation: displacements, inner node, pressures."""
         h, w, volume = self._stretch(u, inner, which), self._weights[which], self._volumes[which, None]
         table, metric = self.mesh.reference, self._metric[which, None]
         m, d, n = len(w), h.shape[-1], table.gradients.shape[1]
@@ -324,10 +345,7 @@ class Elements:
         j, rate = determinant(h) / volume, cofactor(h) / volume[..., None, None]  # det F and its derivative to h
         t, hoops = self._hoops(u, inner, which) if self.mesh.turned else (np.ones_like(j), None)
         hydro = p * t - mu / j
-        stress = (w * mu)[..., None, None] * (h @ metric) + (w * hydro)[..., None, None] * rate
-        residual, matrix = np.empty((m, size + d + 1)), np.empty((m, size + d + 1, size + d + 1))
-        forces = stress.transpose(0, 2, 1, 3).reshape(m * d, -1) @ table.flat
-        residual[:, :size] = forces.reshape(m, d, n).transpose(0, 2, 1).reshape(m, size)
+        matrix = np.empty((m, size + d + 1, size + d + 1))
         for i in range(d):
             for k in range(i, d):
                 block = (w * mu / j**2)[..., None, None] * rate[:, :, i, :, None] * rate[:, :, k, None, :]
@@ -341,8 +359,6 @@ class Elements:
         along = np.matmul(table.gradients, rate.transpose(0, 1, 3, 2)).reshape(m, -1, size)  # dJ to the displacements
         if hoops is not None:
             out = slice(0, size, d)
-            forces = (w * (mu * t + p * j - mu / t))[..., None] * hoops
-            residual[:, out] += forces.sum(axis=1)
             matrix[:, out, out] += np.matmul(hoops.transpose(0, 2, 1), (w * mu * (1 + t**-2))[..., None] * hoops)
             both = np.matmul(hoops.transpose(0, 2, 1), (w * p)[..., None] * along)
             matrix[:, out, :size] += both
@@ -351,13 +367,9 @@ class Elements:
             along[..., out] += j[..., None] * hoops
         coupling = np.matmul((along * w[..., None]).transpose(0, 2, 1), table.pressures)
         matrix[:, :size, size:], matrix[:, size:, :size] = coupling, coupling.transpose(0, 2, 1)
-        mass = np.einsum("mq,qi,qk->mik", w, table.pressures, table.pressures)
-        compliance = self.law.compliance_per_pa[which, None]
-        matrix[:, size:, size:] = -mass * np.maximum(compliance, 1 / (_STIFF * mu))[..., None]
-        residual[:, size:] = (w * (j * t - 1)) @ table.pressures - compliance * np.einsum(
-            "mik,mk->mi", mass, inner.pressure[which]
-        )
-        return residual, matrix
+        compliance = np.maximum(self.law.compliance_per_pa[which, None], 1 / (_STIFF * mu))
+        matrix[:, size:, size:] = -self._masses[which] * compliance[..., None]
+        return matrix
 
 
 def cofactor(h: Real) -> Real:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 
 from sensorgen.core.arrays import Mask, Real, Whole
 
@@ -39,16 +39,25 @@ def solved_by_lu(matrix: csr_matrix, right: Real) -> Real:
     return solution
 
 
-def by_lu(matrix: csr_matrix, right: Real) -> Real | None:
-    """Solution of a symmetric system that may be indefinite, or None where it is singular.
+@dataclass
+class Lu:
+    """Systems that are symmetric but may be indefinite, by factors that are kept while the matrix stays the same.
 
     Unknowns are eliminated as they are numbered: :func:`elimination_order` numbers them so that factors stay sparse.
     """
-    try:
-        solution: Real = splu(matrix.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=_PIVOT, **_SPARSE).solve(right)
-    except RuntimeError:
-        return None
-    return solution
+
+    _last: tuple[csr_matrix, SuperLU] | None = field(default=None, repr=False)
+
+    def __call__(self, matrix: csr_matrix, right: Real) -> Real | None:
+        """Solution, or None where the matrix is singular."""
+        if not (self._last and self._last[0] is matrix):
+            try:
+                factors = splu(matrix.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=_PIVOT, **_SPARSE)
+            except RuntimeError:
+                return None
+            self._last = matrix, factors
+        solution: Real = self._last[1].solve(right)
+        return solution
 
 
 def elimination_order(pattern: csr_matrix) -> Whole:

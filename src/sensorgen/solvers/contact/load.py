@@ -10,14 +10,15 @@ from scipy.sparse.csgraph import connected_components
 
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.solvers.contact.contact import FacePairs, Faces, carrying
-from sensorgen.solvers.contact.element import Elements, Inner, Tangent
-from sensorgen.solvers.contact.factors import by_lu
+from sensorgen.solvers.contact.element import Elements, Inner, Tangent, Unbalanced
+from sensorgen.solvers.contact.factors import Lu
 
 _ENOUGH = 1e-6  # residual over load
 _LEAST = 1e-7  # of the penalty: pressures below it are lost in the rounding of incompressible rubber [-]
 _NEARLY = 1e-3  # residual over load before the contact partners are updated
 _STILL = 1e-10  # a step so much shorter than the displacement is rounding: nu near 1/2 turns it into forces
 _MOST_STEPS = 15
+_SLOW = 0.2  # an earlier stiffness serves as long as each step with it leaves less than this share of the residual [-]
 _LEAST_J = 0.05  # a step may not compress an element below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of Newton's step
 _MOST_CUTS, _MORE_CUTS = 4, 4  # failed load steps in all before partners may stay; then before a cell is given up
@@ -34,6 +35,14 @@ class State:
     u_m: Real
     inner: Inner
     pairs: FacePairs
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """Derivative of the forces at a state: of each element, and of all with the contact on the free displacements."""
+
+    elements: Tangent
+    whole: csr_matrix
 
 
 @dataclass(frozen=True)
@@ -70,11 +79,11 @@ class Problem:
     load: Real
     penalty_pa: float
     stick: bool = False
-    solver: Callable[[csr_matrix, Real], Real | None] = by_lu
+    solver: Callable[[csr_matrix, Real], Real | None] = field(default_factory=Lu)
     sound: Callable[[Real], bool] | None = None
     settled: float = 0.05
     updates: int = 4
-    _last: list[tuple[Tangent, Real, csr_matrix]] = field(default_factory=list, repr=False, compare=False)
+    _last: list["Stiffness"] = field(default_factory=list, repr=False, compare=False)
 
     @property
     def dimension(self) -> int:
@@ -154,21 +163,20 @@ class Problem:
         starts = np.searchsorted(entries, n * np.arange(n + 1))
         return csr_matrix((np.zeros(len(entries)), entries % n, starts), (n, n)), inside, place
 
-    def contact_forces(self, pairs: FacePairs, u: Real) -> tuple[Real, csr_matrix]:
-        """Forces of the contact, and its stiffness on the free displacements."""
+    def _springs(self, pairs: FacePairs, u: Real) -> Iterator[tuple[csr_matrix, Mask, Real]]:
+        """Rows of what the contact acts on, gaps and slips, on which of them it does, and how far each is moved [m]."""
         gap = self.gaps(pairs, u)
-        springs = [(pairs.gap, gap < 0, gap)]
+        yield pairs.gap, gap < 0, gap
         if self.stick:
-            ways = self.slips(pairs, u).T
-            springs += [(slip, pairs.sticks, way) for slip, way in zip(pairs.slips, ways, strict=True)]
-        force, stiffness = np.zeros(len(u)), csr_matrix((self.free.shape[1],) * 2)
-        for rows, which, length in springs:
-            if which.any():
-                row, k = rows[which], pairs.stiffness_pa[which]
-                across = row @ self.free
-                force += row.T @ (k * length[which])
-                stiffness = stiffness + across.T @ diags(k) @ across
-        return force, stiffness
+            for slip, way in zip(pairs.slips, self.slips(pairs, u).T, strict=True):
+                yield slip, pairs.sticks, way
+
+    def contact_force(self, pairs: FacePairs, u: Real) -> Real:
+        """Forces of the contact on all displacements (d n,) [N], per depth in two dimensions [N/m]."""
+        force = np.zeros(len(u))
+        for rows, acts, length in self._springs(pairs, u):
+            force += rows.T @ (pairs.stiffness_pa * acts * length)
+        return force
 
     def contact_energy(self, state: State) -> float:
         """Energy in the penalty [J], per depth in two dimensions [J/m]."""
@@ -176,51 +184,76 @@ class Problem:
         slip = (self.slips(state.pairs, state.u_m) ** 2).sum(axis=1) * state.pairs.sticks
         return float(0.5 * (state.pairs.stiffness_pa * (gap**2 + slip)).sum())
 
-    def residual(self, u: Real, inner: Inner, pairs: FacePairs, pressure_pa: float) -> tuple[Real, csr_matrix, Tangent]:
-        """Unbalanced forces on the free displacements, their derivative, and the elements' condensed part."""
-        local, inside, whole = self._elastic(self.elements.tangent(u, inner))
-        force, stiffness = self.contact_forces(pairs, u)
-        stiffness = whole + stiffness if stiffness.nnz else whole  # a sum forgets zeros, and the pattern with them
-        return self.free.T @ (force + inside - pressure_pa * self.load), stiffness, local
+    def _linearised(self, state: State) -> Stiffness:
+        """Derivative of the forces at a state."""
+        tangent, (empty, inside, place) = self.elements.tangent(state.u_m, state.inner), self.pattern
+        data = np.bincount(place, tangent.stiffness.ravel()[inside], empty.nnz)
+        whole = csr_matrix((data, empty.indices, empty.indptr), empty.shape)
+        for rows, acts, _ in self._springs(state.pairs, state.u_m):
+            if acts.any():
+                across = rows[acts] @ self.free
+                whole = whole + across.T @ diags(state.pairs.stiffness_pa[acts]) @ across
+        return Stiffness(tangent, whole)
 
-    def _elastic(self, local: Tangent) -> tuple[Tangent, Real, csr_matrix]:
-        """Forces of all elements, and their stiffness on the free displacements; the last ones are kept."""
-        if not (self._last and self._last[0][0] is local):
-            empty, inside, place = self.pattern
-            force = np.bincount(self.elements.freedoms.ravel(), local.force.ravel(), len(self.load)).astype(float)
-            data = np.bincount(place, local.stiffness.ravel()[inside], empty.nnz)
-            self._last[:] = [(local, force, csr_matrix((data, empty.indices, empty.indptr), empty.shape))]
-        return self._last[0]
+    def _residual(self, state: State, tangent: Tangent) -> tuple[Real, Unbalanced]:
+        """Unbalanced forces on the free displacements, and what the elements leave."""
+        residual = self.elements.residual(state.u_m, state.inner)
+        own = tangent.condensed(residual, self.elements.law.mu_pa)
+        inside = np.bincount(self.elements.freedoms.ravel(), own.force.ravel(), len(self.load)).astype(float)
+        force = inside + self.contact_force(state.pairs, state.u_m) - state.pressure_pa * self.load
+        return self.free.T @ force, own
 
     def newton(self, state: State, pressure_pa: float, pairs: FacePairs, enough: float) -> State | None:
         """Equilibrium at a pressure with frozen contact pairs, or None where Newton's method does not converge.
 
-        ``enough`` is the residual to reach, over the load [-].
+        The last stiffness, of an earlier state, serves first. ``enough`` is the residual to reach, over the load [-].
         """
-        u, inner = state.u_m, state.inner
-        scale = max(pressure_pa, _LEAST * self.penalty_pa) * np.abs(self.free.T @ self.load).max()
+        here, own = replace(state, pressure_pa=pressure_pa, pairs=pairs), not self._last
         for _ in range(_MOST_STEPS):
-            residual, stiffness, local = self.residual(u, inner, pairs, pressure_pa)
-            if np.isfinite(residual).all() and np.abs(residual).max() < enough * scale and local.imbalance() < enough:
-                return State(pressure_pa, u, inner, pairs)
-            step = self.solver(stiffness, -residual) if np.isfinite(residual).all() else None
-            if step is None:
-                return None
-            du = self.free @ step
-            moved = self._moved(u, inner, du, local.inner_step(du[self.elements.freedoms]))
-            if moved is None:
-                return None
-            u, inner = moved
-            if np.abs(du).max() <= _STILL * np.abs(u).max() and local.imbalance() < _NEARLY:
-                return State(pressure_pa, u, inner, pairs)
+            if own:
+                self._last[:] = [self._linearised(here)]
+            reached, balanced = self._descended(here, self._last[0], enough, own=own)
+            if reached is None:
+                break
+            if balanced:
+                return reached
+            here, own = reached, True
+        self._last.clear()
         return None
 
-    def _moved(self, u: Real, inner: Inner, du: Real, inside: Real) -> tuple[Real, Inner] | None:
-        """Displacements after a step of Newton's method, or so much of it that no element is squeezed too far."""
+    def _descended(self, state: State, by: Stiffness, enough: float, *, own: bool) -> tuple[State | None, bool]:
+        """As far as one stiffness serves, and whether that is the balance; None where no step is possible.
+
+        A state's ``own`` stiffness serves at least once; that of another one, while each step leaves much less.
+        """
+        scale = max(state.pressure_pa, _LEAST * self.penalty_pa) * np.abs(self.free.T @ self.load).max()
+        rest, elements = self._residual(state, by.elements)
+        worst, fast = np.abs(rest).max(), True
+        while not (worst < enough * scale and elements.imbalance < enough):
+            after = self._moved(state, by, rest, elements) if fast else None
+            if after is None:
+                return None if own else state, False
+            (rest, elements), before = self._residual(after, by.elements), worst
+            worst = np.abs(rest).max()
+            if not (own or worst < before):
+                return state, False
+            moved, own, fast = np.abs(after.u_m - state.u_m).max(), False, worst < _SLOW * before
+            state = after
+            if moved <= _STILL * np.abs(state.u_m).max() and elements.imbalance < _NEARLY:
+                break
+        return state, True
+
+    def _moved(self, state: State, by: Stiffness, rest: Real, elements: Unbalanced) -> State | None:
+        """State after a step of Newton's method, or so much of it that no element is squeezed too far; None if none."""
+        step = self.solver(by.whole, -rest) if np.isfinite(rest).all() else None
+        if step is None:
+            return None
+        du = self.free @ step
+        inside = by.elements.inner_step(elements, du[self.elements.freedoms])
         for share in _SHARES:
-            moved = u + share * du, inner.moved(inside, share)
-            if self.elements.volume_ratio(*moved).min() > _LEAST_J:
-                return moved
+            u, inner = state.u_m + share * du, state.inner.moved(inside, share)
+            if self.elements.volume_ratio(u, inner).min() > _LEAST_J:
+                return replace(state, u_m=u, inner=inner)
         return None
 
     def extrapolated(self, state: State, before: State, pressure_pa: float) -> State:
