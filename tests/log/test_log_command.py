@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from sensorgen.measure.log import Log, Prediction, Reading
+from sensorgen.measure.log import Log, Reading
 from sensorgen.measure.log.notes import reading
 
 
@@ -131,9 +131,9 @@ def test_a_prediction_is_kept_when_it_is_made(run, path):
     run("multimeter", "26 triX .1mm", "--y", "650")
     assert "prediction 1" in run("show", "26 triX .1mm").out
     with Log(path) as log:
-        (kept,) = log.entries(Prediction)
-        assert [*log.entries(Prediction, design_id=kept.design_id)] == [kept]
-        assert [*log.entries(Prediction, design_id="x")] == []
+        (kept,) = log.predictions()
+        assert log.predictions(design_id=kept.design_id) == (kept,)
+        assert log.predictions(design_id="x") == ()
         assert log.readings()[0].design_id == kept.design_id
     assert json.loads(kept.data)["capacitance"]["lower"] > 1e-12
     assert "is sound: 3 rows" in run("verify").out
@@ -153,7 +153,7 @@ def test_a_prediction_ahead_of_the_measurement(run, path, tmp_path):
     failed = run("multimeter", "26 triY .1mm", "--visa", "nowhere", "--axis", "y", "--predict")
     assert failed.code == 2  # no meter, but what it should have read is on record
     with Log(path) as log:
-        readings, predictions = log.readings(), [*log.entries(Prediction)]
+        readings, predictions = log.readings(), log.predictions()
         assert [r.design for r in readings] == ["trix-d0.1", "trix-d0.1", "trix-d0.2"]
         assert [p.design for p in predictions] == ["trix-d0.1", "trix-d0.2", "triy-d0.1"]
         assert predictions[0].logged_at <= readings[0].logged_at
@@ -171,8 +171,8 @@ def test_a_print_beds_own_design_is_the_one_that_is_predicted(run, path, tmp_pat
     words = ("multimeter", "26 triX .1mm", "--y", "650", "--predict", "--log", "other.db")
     assert "log a prediction of its file: sensorgen log predict FILE" in run(*words).line
     with Log(path) as log, Log(tmp_path / "other.db") as other:
-        assert log.count(Prediction) == 1
-        assert other.count(Prediction) == other.count(Reading) == 0
+        assert len(log.predictions()) == 1
+        assert other.predictions() == other.readings() == ()
 
 
 def test_what_slicers_print_is_kept_beside_what_was_drawn(run, path, tmp_path):
@@ -181,7 +181,7 @@ def test_what_slicers_print_is_kept_beside_what_was_drawn(run, path, tmp_path):
     (tmp_path / "batch.json").write_text(json.dumps(BATCH | {"slicers": used}))
     assert "5 of 5 rows logged" in run("import", "batch.json").out
     with Log(path) as log:
-        (kept,) = log.entries(Prediction)
+        (kept,) = log.predictions()
     assert json.loads(kept.data) == {"capacitance_f": {"lower": 1e-11}, "printed": {"prusa": report}}
     for slicers, message in (
         (3, "slicers is 3; expected a mapping"),

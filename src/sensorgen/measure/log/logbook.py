@@ -134,6 +134,14 @@ class Log(AbstractContextManager["Log", None]):
         """Recordings of the bench, the earliest first; parameters as :meth:`entries`."""
         return tuple(self.entries(BenchRun, last=last, superseded=superseded, replaced=False, **equal))
 
+    def predictions(self, *, design_id: str = "") -> tuple[Prediction, ...]:
+        """Predictions, the earliest first; of one design if ``design_id`` is given."""
+        return tuple(self.entries(Prediction, design_id=design_id) if design_id else self.entries(Prediction))
+
+    def batches(self) -> tuple[Batch, ...]:
+        """Print beds, the earliest first."""
+        return tuple(self.entries(Batch))
+
     def entries(
         self,
         kind: type[_Kind],

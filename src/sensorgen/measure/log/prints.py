@@ -103,7 +103,7 @@ def designs(log: Log, refused: dict[str, str] | None = None) -> dict[str, Design
     """
     by_identity = dict[str, Design]()
     recorded = [(row.uid, row.design, row.data) for row in log.entries(DesignRow)]
-    for batch in log.entries(Batch):  # before version 3 the log had them in the files of batches only
+    for batch in log.batches():  # before version 3 the log had them in the files of batches only
         with suppress(SensorgenError):
             data = _json(log.raw(batch.file)).get("designs", {})
             recorded += [(key, of["name"], json.dumps(of["resolved"])) for key, of in data.items()]
@@ -278,7 +278,7 @@ def predict(log: Log, specimen: str) -> list[Entry]:
     bound = log.bound(notes.specimen(specimen, log).specimen)
     design = designs(log).get(bound.design_id) if bound else notes.design_of(specimen)
     design_id = bound.design_id if bound else design.id() if design else ""
-    if design_id and next(log.entries(Prediction, design_id=design_id), None):
+    if design_id and log.predictions(design_id=design_id):
         return []
     if design is None:
         raise MissingValue(f"{specimen!r} names no design; log a prediction of its file: sensorgen log predict FILE")
