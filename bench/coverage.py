@@ -141,9 +141,8 @@ def after(model, posterior, reference, strip, seed, where):
     base, averages = Baseline(model, posterior, reference), independent_sensor.AVERAGES
     changed = np.array([bool(base.change(z, strip.noise / averages**0.5)) for z in made.rest_ohm])
     known = posterior.presses > 0
-    inverter = Inverter(
-        model, posterior, force_limit_n=7.5 if known else 13.0, otherwise=OTHERWISE if known else 0.0
-    )  # fmt: skip
+    allowed = {"otherwise": OTHERWISE, "session": True} if known else {}
+    inverter = Inverter(model, posterior, force_limit_n=7.5 if known else 13.0, **allowed)
     inverted = inverter.batch(unseen.ratio, changed=changed)
     doubt_rest(inverted, np.zeros(AFTER, bool), 0)
     ok = inverted.verdict == Verdict.OK
@@ -197,9 +196,11 @@ def changes_text(specimens):
     foot = (
         "\n\nAt 0.1 % noise the frequencies cannot tell one press from two, or from a hand: their second-order "
         "difference is below 0.03 % of Z. At 0.01 % on electrodes of 50 kohm half to four fifths of them are seen as "
-        "more than one press. A rest read under 1 N shifts C of a blunt print by 0.07 %: less than a day does. After a "
-        "recheck by 5 presses the sound sensor's median width is 1.2 N as drawn and 1.9 N as printed, covered by 0.94 "
-        "to 0.95; softened by 1.4, 1.0 and 1.6 N, 0.94 to 0.96.\n"
+        "more than one press. A rest read under 1 N shifts C of a blunt print by 0.07 %: less than a day does; the "
+        "readings of a session that lie below it show it together. At the end half of the tip presses twice as hard "
+        "and C of a sharp cell rises less: one reading tells the place to 67 mm, those of a session together that all "
+        "are there. After a recheck by 5 presses the sound sensor's median width is 1.2 N as drawn and 1.9 N as "
+        "printed, covered by 0.94 to 0.95; softened by 1.4, 1.0 and 1.6 N, 0.94 to 0.96.\n"
     )
     return head + "\n".join(rows) + foot
 

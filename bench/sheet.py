@@ -17,7 +17,9 @@ from matplotlib import pyplot as plt
 
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
-from sensorgen.models.sheet import BY, Contact, Sheet, SheetPatch, impedance, solve
+from sensorgen.models.sheet import impedance, solve
+from sensorgen.solvers.sheet.parts import Contact, Sheet, SheetPatch
+from sensorgen.solvers.sheet.solve import BY
 
 RESULTS = Path(__file__).parent / "results"
 CELLS = (10, 20, 40, 80)

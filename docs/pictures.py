@@ -15,13 +15,15 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.design import make
 from sensorgen.export import slicing
 from sensorgen.export.layered import closed
-from sensorgen.models.sheet import Sheet, SheetPatch, contact_sets, localise
+from sensorgen.models.sheet import localise
 from sensorgen.models.stack import GroundTie
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.double_layer import WIRINGS, Touching, press_at, stacked
 from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
 from sensorgen.scene.geometry.meshes import mesh
+from sensorgen.solvers.sheet.parts import Sheet, SheetPatch
+from sensorgen.solvers.sheet.solve import contact_sets
 
 PICTURES = DOCS / "pictures"
 SENSORS = {

@@ -117,7 +117,7 @@ def test_the_most_that_are_tried_are_stated(plate, monkeypatch):
 def test_a_change_that_senses_nothing_is_not_advice(plate, monkeypatch):
     """Planted: the design senses, its changes do not."""
     design, made, _ = plate
-    monkeypatch.setattr("sensorgen.workflows.advice.grade", lambda one: (2, 2) if one is made else (0, 0))
+    monkeypatch.setattr("sensorgen.workflows.trial.grade", lambda one: (2, 2) if one is made else (0, 0))
     advice = advise(design, made, 1e9)
     assert advice.tried == ()
     assert "no change was found" in next(iter(advice.document()))
@@ -253,7 +253,7 @@ def test_what_improves_the_sensor_is_first_and_losses_are_in_its_line(plate, mon
         return numbers(replace(made, findings=()), force_resolution=0.2 if good else 1.2)
 
     monkeypatch.setattr(best, "of", lambda shape: (known,) if shape == "reference" else ())
-    monkeypatch.setattr("sensorgen.workflows.advice.trial", planted)
+    monkeypatch.setattr("sensorgen.workflows.trial.trial", planted)
     advice = advise(design, numbers(made), 1e9)
     first, *others = [one.words() for one in advice.tried]
     assert first.startswith("best known plate: quality fine -> extrafine, dielectric_mm 0.57 -> 0.3: ")

@@ -15,7 +15,7 @@ from sensorgen.design.design import make
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.inverse import answers
-from sensorgen.prediction.inverse.estimator import Estimator, Prior, estimate
+from sensorgen.prediction.inverse.estimator import Estimator, Prior
 from sensorgen.prediction.inverse.forward import Forward
 from sensorgen.prediction.inverse.verdict import Status, chi2_limit
 from sensorgen.prediction.query import TONES_HZ
@@ -66,6 +66,10 @@ def presses(count, sensor=None, force=(0.2, 6.0), seed=1, ends=0.0):
 
 def readings(sensor, tones, force, position):
     return sensor.impedance(tones, np.asarray(force)[:, None], np.asarray(position)[:, None])
+
+
+def estimate(sensor, tones, z, *how):
+    return Estimator(sensor, tones, *how).batch(z)
 
 
 def noisy(z, noise=NOISE, seed=2):

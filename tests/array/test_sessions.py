@@ -292,6 +292,9 @@ def test_files_of_every_reference(tmp_path):
                         [(0, 3, 1, 2, 0, 1), (1, 3, 5, "", 90, 0)]), 7)  # fmt: skip
     assert (one.day, one.pressure_kpa.tolist(), one.rest.tolist()) == (3.0, [[0, 0], [90, 90]], [True, False])
     assert np.isnan(one.reading[1, 1])
+    zero = session(table(tmp_path / "z.csv", [*head, "pressure_kpa", "rest"],
+                         [(0, 3, 1, 2, 4, 1), (1, 3, 1, 2, 6, 1), (2, 3, 5, 6, 95, 0)]), 7)  # fmt: skip
+    assert zero.pressure_kpa[:, 0].tolist() == [-1, 1, 90]  # what a gauge shows without load is its zero
     press = session(table(tmp_path / "p.csv", ["time_s", "heel", "toe", "element", "force_n"],
                           [(0, 1, 2, "", 0), (1, 1, 3, "toe", 5), (2, 1, 2, "", "")]), 1, area_mm2=50.0)  # fmt: skip
     assert press.day == 1

@@ -36,7 +36,6 @@ def estimated_gap(variant, walls):
         (0.2, "arachne", "fine"),
         pytest.param(0.3, "classic", "fine", marks=pytest.mark.nightly),
         pytest.param(0.2, "cura-gaps", "fine", marks=pytest.mark.nightly),  # nothing is lost, but what is thin swells
-        pytest.param(0.12, "arachne", "extrafine", marks=pytest.mark.nightly),
     ],
 )
 def test_gap_and_capacitance_that_were_asked_for_come_out(film, walls, quality):
@@ -50,6 +49,15 @@ def test_gap_and_capacitance_that_were_asked_for_come_out(film, walls, quality):
     assert abs(uncompensated / wanted - 1) > 0.03 or estimated_gap(asked, walls) > film + 0.01
     before, after = changed(changes)["electrode gap as printed [mm]"]
     assert before >= after == film
+
+
+@pytest.mark.nightly
+def test_what_prints_in_air_alone_is_refused_with_the_finding():
+    asked = small(parameters=SHORT | {"dielectric_mm": 0.12}, quality="extrafine")
+    with pytest.raises(
+        OutOfRange, match=r"9-bridge, an island 0\.\d+ mm wide starts in mid-air.*; nearest: a gap of 0\.12"
+    ):
+        compensated(asked, "arachne")
 
 
 def test_a_film_of_one_layer_is_refused_with_the_nearest(monkeypatch, shared_cache):

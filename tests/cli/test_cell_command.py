@@ -150,29 +150,6 @@ def test_presses_of_a_formula(run):
     assert (gone.code, "all air is gone at 0.379 mm" in gone.out) == (1, True)
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--model", "thesis-3.35", "--press", "0.01"], "knows no press; expected thesis-3.35-swept, thesis-3.1.2"),
-        (
-            ["--press", "0.01"],
-            "--press is for formulas, as --model thesis-3.1.2; solved, under a stress: sensorgen compr",
-        ),
-        (["--model", "columns", "--press", "0.01"], "--press is for formulas"),
-        (["--model", "thesis-3.1.3"], "unknown formula 'thesis-3.1.3'; did you mean 'thesis-3.1.2'"),
-        (["--model", "thesis-3.35", "--explain"], "there is no plan; leave out --model"),
-        (["--model", "thesis-3.1.2", "--press", "0.5"], "all air is gone at 0.379 mm; expected less"),
-        (["--model", "thesis-3.1.2", "--press", "-1"], "expected 0 or more"),
-        (["--model", "thesis-3.1.2", "--set", "loss_x60=0.1"], "knows no losses"),
-        (["--model", "thesis-3.1.2", "--press", "0,0.1", "--sweep", "dielectric_mm=0.1,0.2"], "expected one of them"),
-    ],
-)
-def test_wrong_words_about_formulas(run, words, said):
-    got = run("cell", "tri", *words)
-    assert (got.code, got.out) == (2, "")
-    assert said in got.line
-
-
 @pytest.fixture
 def no_solver(monkeypatch):
     """Nothing that NGSolve brings can be imported."""
@@ -358,6 +335,18 @@ def stat(pid):
         (["--jobs", "0"], "--jobs"),
         (["--drawn", "--walls", "cura"], "--drawn and --walls at once; expected one of them"),
         (["--as-printed"], "unknown option '--as-printed'"),
+        (["--model", "thesis-3.35", "--press", "0.01"], "knows no press; expected thesis-3.35-swept, thesis-3.1.2"),
+        (
+            ["--press", "0.01"],
+            "--press is for formulas, as --model thesis-3.1.2; solved, under a stress: sensorgen compr",
+        ),
+        (["--model", "columns", "--press", "0.01"], "--press is for formulas"),
+        (["--model", "thesis-3.1.3"], "unknown formula 'thesis-3.1.3'; did you mean 'thesis-3.1.2'"),
+        (["--model", "thesis-3.35", "--explain"], "there is no plan; leave out --model"),
+        (["--model", "thesis-3.1.2", "--press", "0.5"], "all air is gone at 0.379 mm; expected less"),
+        (["--model", "thesis-3.1.2", "--press", "-1"], "expected 0 or more"),
+        (["--model", "thesis-3.1.2", "--set", "loss_x60=0.1"], "knows no losses"),
+        (["--model", "thesis-3.1.2", "--press", "0,0.1", "--sweep", "dielectric_mm=0.1,0.2"], "expected one of them"),
     ],
 )
 def test_wrong_words(run, words, said):

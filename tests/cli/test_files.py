@@ -104,13 +104,9 @@ def test_no_such_file(run):
     assert "cannot read 'no.yaml': No such file or directory" in run("check", "no.yaml").line
 
 
-def test_a_link_that_leads_nowhere(run, tmp_path):
-    (tmp_path / "link.yaml").symlink_to("nowhere")
-    assert "cannot read 'link.yaml'" in run("check", "link.yaml").line
-
-
-def test_a_link_to_itself(run, tmp_path):
-    (tmp_path / "link.yaml").symlink_to("link.yaml")
+@pytest.mark.parametrize("place", ["nowhere", "link.yaml"])
+def test_a_link_that_leads_nowhere_or_to_itself(run, tmp_path, place):
+    (tmp_path / "link.yaml").symlink_to(place)
     assert "cannot read 'link.yaml'" in run("check", "link.yaml").line
 
 

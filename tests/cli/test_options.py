@@ -234,9 +234,10 @@ def test_waived_findings_do_not_stop_a_build(run, tmp_path):
 
 
 def test_a_share_may_be_given_in_percent():
-    from sensorgen.cli.commands import ShownShare
+    from sensorgen.cli.commands import KINDS
     from sensorgen.core.errors import BadInput
 
-    assert ShownShare().convert("20%", None, None) == ShownShare().convert("0.2", None, None) == 0.2
+    share = KINDS["share"]
+    assert share.convert("20%", None, None) == share.convert("0.2", None, None) == 0.2
     with pytest.raises(BadInput, match=r"expected 0\.2 or 20%"):
-        ShownShare().convert("much", None, None)
+        share.convert("much", None, None)

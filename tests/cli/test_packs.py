@@ -359,6 +359,8 @@ def test_links_to_themselves_and_folders_that_are_links(run, here, tmp_path_fact
         (b"a: &a [x]\nb: *a\n", "line 2: aliases .* are not taken"), (b"\0" * 200_000, "200000 bytes; expected at"),
         (b"\xff\xfe\0", "not UTF-8 at byte 0"), (b"a\0b: 1", "control character #x0000 at position 1"),
         (b"[" * 5000, "nested deeper than 20 levels"), (b"", "holds nothing; expected a mapping"),
+        (b"title: !!python/object/apply:os.system [ls]\n", "tags .* are not taken"),
+        (b"title: 1\n", "eel.yaml: title is 1; expected text"),
         (b'title: "a\\e[31mb"\nabout: x\ncolour: "#ffffff"\nconductor: true\nproperties: {}\n', "title is .* one line"),
     ],
 )  # fmt: skip
@@ -372,24 +374,6 @@ def test_hostile_files_of_a_pack(run, here, content, expected):
     assert said.code == 1
     assert re.search(expected, said.words)
     assert len(list(here.rglob("*"))) == 2
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("a: &a [1]\nb: *a\n", "aliases .* are not taken"),
-        ("title: !!python/object/apply:os.system [ls]\n", "tags .* are not taken"),
-        ("title: x\n" * 20_000, "bytes; expected at most 100000"),
-        ("[" * 30, "nested deeper than 20 levels|expected"),
-        ("title: 1\n", "eel.yaml: title is 1; expected text"),
-    ],
-)
-def test_hostile_yaml(run, here, text, expected):
-    (here / "materials").mkdir()
-    (here / "materials" / "eel.yaml").write_text(text)
-    said = run("check", "tri", "--material", "electrode=eel", "--tool", "eel=1")
-    assert said.code == 2
-    assert re.search(expected, said.line), said.line
 
 
 def test_trust_is_of_a_content(run, here):

@@ -10,8 +10,8 @@ import pytest
 
 from sensorgen.cli import render
 from sensorgen.core.document import text
-from sensorgen.models.sheet import Sheet, SheetPatch
 from sensorgen.prediction.sheet_study import SheetStudy
+from sensorgen.solvers.sheet.parts import Sheet, SheetPatch
 
 WORDS = ("sheet", "reference", "--size", "60x60", "--frequencies", "100kHz,1MHz")
 

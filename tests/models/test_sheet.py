@@ -9,8 +9,10 @@ import pytest
 from line_cases import PLATE
 
 from sensorgen.core.units import EPS0_F_PER_M
-from sensorgen.models import line, sheet
-from sensorgen.models.sheet import BY, Contact, Sheet, SheetPatch, impedance, solve
+from sensorgen.models import line
+from sensorgen.models.sheet import impedance, solve
+from sensorgen.solvers.sheet.parts import Contact, Sheet, SheetPatch
+from sensorgen.solvers.sheet.solve import BY, depth_m
 
 TONES = np.array([1e-3, 1.1e3, 99.7e3, 1e6])
 C = EPS0_F_PER_M * PLATE["eps_r"] / PLATE["film_m"]
@@ -344,8 +346,6 @@ def test_the_estimated_error_covers_the_true_one():
 def test_the_depth_is_that_of_the_line():
     film = replace(STRIP, leak_s_per_m2=3.0)
     y = 3.0 + 2j * np.pi * 1e5 * C
-    assert sheet.depth_m(film, 1e5) == pytest.approx(1 / abs(y * sum(STRIP.sheet_resistance_ohm)) ** 0.5)
-    assert sheet.depth_m(STRIP, 0.0) == np.inf
-    assert sheet.depth_m(STRIP, 1e5, SheetPatch(0, 0, 0.01, 0.01, 4.0, (4.0, 4.0))) == pytest.approx(
-        sheet.depth_m(STRIP, 1e5) / 4
-    )
+    assert depth_m(film, 1e5) == pytest.approx(1 / abs(y * sum(STRIP.sheet_resistance_ohm)) ** 0.5)
+    assert depth_m(STRIP, 0.0) == np.inf
+    assert depth_m(STRIP, 1e5, SheetPatch(0, 0, 0.01, 0.01, 4.0, (4.0, 4.0))) == pytest.approx(depth_m(STRIP, 1e5) / 4)

@@ -11,7 +11,9 @@ from line_cases import PLATE, TONES
 from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
-from sensorgen.models.sheet import PressErrors, Sheet, SheetPatch, contact_sets, depth_m, impedance, localise, solve
+from sensorgen.models.sheet import impedance, localise, solve
+from sensorgen.solvers.sheet.parts import Sheet, SheetPatch
+from sensorgen.solvers.sheet.solve import PressErrors, contact_sets, depth_m
 
 C = EPS0_F_PER_M * PLATE["eps_r"] / PLATE["film_m"]
 FILM = Sheet(0.1, 0.1, (450.0, 450.0), C)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
-from sensorgen.models.sheet import Contact, Sheet, SheetPatch, impedance, solve
+from sensorgen.models.sheet import impedance, solve
+from sensorgen.solvers.sheet.parts import Contact, Sheet, SheetPatch
 
 FILM = Sheet(0.1, 0.05, (450.0, 700.0), 7e-8)
 PORT = (FILM.edge("top", "left"), FILM.edge("bottom", "left"))

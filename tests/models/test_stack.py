@@ -11,6 +11,7 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models import line, stack
 from sensorgen.models.compression import unconfined
 from sensorgen.models.stack import Film, Press, Stack, Track, port
+from sensorgen.solvers import multiline
 from sensorgen.solvers.line.inputs import read
 
 EXACT = 1e-11
@@ -409,14 +410,14 @@ def test_standard_errors_are_those_of_the_fisher_matrix():
     slopes, noise = rng.normal(size=(3, 7)) + 1j * rng.normal(size=(3, 7)), rng.uniform(0.5, 2.0, 7)
     fisher = (slopes.conj() / noise**2 @ slopes.T).real
     expected = np.sqrt(np.diag(np.linalg.inv(fisher)))
-    assert stack.standard_errors(slopes, noise) == pytest.approx(expected, rel=1e-12)
+    assert multiline.standard_errors(slopes, noise) == pytest.approx(expected, rel=1e-12)
     scale = np.array([1e9, 1.0, 1e-9])
-    assert stack.standard_errors(slopes * scale[:, None], noise) == pytest.approx(expected / scale, rel=1e-12)
+    assert multiline.standard_errors(slopes * scale[:, None], noise) == pytest.approx(expected / scale, rel=1e-12)
 
 
 def test_what_readings_do_not_tell_apart_has_no_bound():
     slopes = np.array([[1.0, 2.0, 3.0], [2.0, 4.0, 6.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]) + 0j
-    errors = stack.standard_errors(slopes, np.ones(3))
+    errors = multiline.standard_errors(slopes, np.ones(3))
     assert np.isinf(errors).tolist() == [True, True, False, True]
-    few = stack.standard_errors(np.array([[1.0 + 0j], [1.0j], [2.0 + 0j]]), np.ones(1))
+    few = multiline.standard_errors(np.array([[1.0 + 0j], [1.0j], [2.0 + 0j]]), np.ones(1))
     assert np.isinf(few[[0, 2]]).all()

@@ -1,12 +1,14 @@
 """The command line: words in, words out. Each command imports its work inside itself."""
 
 import importlib
+import json
 import os
 import signal
 import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -16,60 +18,11 @@ from sensorgen.core.display import harmless
 from sensorgen.core.errors import SensorgenError, Unprintable, nearest
 from sensorgen.core.version import __version__
 
-SECTIONS = {  # what each command is for, here so that --help imports none of them
-    "Design": {
-        "build": "Write all that a print needs: 3MF, STEP, profiles, drawing.",
-        "import": "Import bodies from STEP, 3MF or STL as a design.",
-        "batch": "Put several sensors on one plate, with a record.",
-        "check": "Decide whether to print a design, and what to change.",
-        "optimise": "Find the best printable designs for a target.",
-        "slice": "Write printer-ready G-code, by a real slicer.",
-        "gcode": "Check G-code before the printer does.",
-        "export": "Write the printed body as 3MF, STEP, STL or voxels.",
-        "show": "Show a design as one page: 3D, section, layers, numbers.",
-        "draw": "Draw the cross-section, its layers and findings, as SVG.",
-    },
-    "Predict": {
-        "predict": "Predict capacitance, resistance and impedance, loaded or not.",
-        "cell": "Capacitance between certified bounds.",
-        "compress": "Displacement and capacitance under stress.",
-        "invert": "Force and position from measured impedances.",
-        "array": "What an array of crossing tracks resolves.",
-        "sheet": "Which contacts and frequencies locate a load in two dimensions.",
-        "stack": "Double sensor, and isolation against touch.",
-    },
-    "Measure": {
-        "log": "Log of readings, recordings, prints and predictions.",
-        "bench": "Plan and run loads, and evaluate the recording.",
-        "calibrate": "Calibrate specimens by known presses.",
-        "report": "Compare predictions and measurements, as one page.",
-        "fit": "Fit material values to what was measured.",
-        "characterise": "Material values from a plate of test structures.",
-        "demo": "The whole loop on a virtual laboratory.",
-    },
-    "Reference": {
-        "new": "Write a material, shape, printer, quality, design, target or experiment to change.",
-        "pack": "Test packs of such files, and trust shape files.",
-        "list": "List shapes, materials, printers, qualities, packs, models or sources.",
-        "schema": "Print the JSON schema of a design, target, experiment or prediction.",
-        "completion": "Print the completion script for a shell.",
-    },
-    "For developers": {
-        "chart": "Draw time against error of every model.",
-        "thesis": "Hold every number of the thesis against ours.",
-    },
-}
+# Of each command its module and what it is for, by sections, so that --help imports none of them
+SECTIONS: dict[str, dict[str, tuple[str, str]]] = json.loads(
+    Path(__file__).with_name("commands.json").read_text("utf-8")
+)
 COMMANDS = tuple(name for commands in SECTIONS.values() for name in commands)
-_MODULES = {  # of commands, where it is not ``cli/NAME_command.py``
-    "chart": "verification.chart_command",
-    "thesis": "verification.thesis_command",
-    **dict.fromkeys(("check", "build", "slice", "batch", "optimise"), "cli.printing"),
-    **dict.fromkeys(("predict", "cell", "compress"), "cli.predictions"),
-    **dict.fromkeys(("calibrate", "fit", "characterise", "report"), "cli.fitting"),
-    **dict.fromkeys(("show", "draw", "export", "import"), "cli.views"),
-    **dict.fromkeys(("array", "sheet", "stack"), "cli.studies"),
-    **dict.fromkeys(("new", "pack", "list", "schema", "completion"), "cli.reference"),
-}
 WRONG_INPUT = 2
 FOUND_ERRORS = 1
 
@@ -90,14 +43,15 @@ class _Lazy(click.Group):
         """The commands in sections."""
         for title, commands in SECTIONS.items():
             with formatter.section(title):
-                formatter.write_dl(list(commands.items()))
+                formatter.write_dl([(name, about) for name, (_, about) in commands.items()])
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
         if name not in COMMANDS:
             return None
-        module = importlib.import_module(f"sensorgen.{_MODULES.get(name, f'cli.{name}_command')}")
+        place, about = next(commands[name] for commands in SECTIONS.values() if name in commands)
+        module = importlib.import_module(f"sensorgen.{place}")
         command: click.Command = getattr(module, f"{name}_command", None) or module.command
-        command.short_help = next(commands[name] for commands in SECTIONS.values() if name in commands)
+        command.short_help = about
         return command
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -253,7 +253,8 @@ def _array(
 
     if bool(port) == simulate:
         raise BadInput(f"{'both' if port else 'neither'} of --port and --simulate; expected one of them")
-    _refuse_times(seconds, unloaded_s)
+    if not (seconds > 0 and 0 <= unloaded_s < inf):
+        raise BadInput(f"--seconds {seconds:g}, --unloaded {unloaded_s:g}; expected seconds above 0, and 0 or more")
     refuse_input(readout)
     model, clock = array_model(design), RealClock()
     first = _first_press(press, model.here.shape)
@@ -301,11 +302,6 @@ def _first_press(crossing: str, shape: tuple[int, int]) -> "NamedPress | None":
 
     with within("--press"):
         return NamedPress(crossings((crossing,), shape)[crossing]) if crossing else None
-
-
-def _refuse_times(seconds: float, unloaded_s: float) -> None:
-    if not (seconds > 0 and 0 <= unloaded_s < inf):
-        raise BadInput(f"--seconds {seconds:g}, --unloaded {unloaded_s:g}; expected seconds above 0, and 0 or more")
 
 
 def _refuse_shape(meter: "FrameMeter", model: "ArrayModel") -> None:

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from sensorgen.core.arrays import Complex, Real
     from sensorgen.core.document import Documented
-    from sensorgen.measure.readings import FileRows, Readings
     from sensorgen.measure.recording import Recording, RigLog
     from sensorgen.measure.signal.presses import Pairs
     from sensorgen.measure.signal.run import Processed
@@ -68,7 +67,8 @@ class Opening:
         parts, rig = self._opened(what, rig_file)
         lockins = _part(parts, self.part)
         del parts  # with the part after it
-        which = _chosen(lockins, self.lockin)
+        _refuse(self.lockin, "lockin", len(lockins), "lock-ins")
+        which = (self.lockin or 1) - 1
         pressed = recording.joined_all(lockins, rig)[which] if rig else None
         return processed(lockins[which], pressed, remove_drift=not self.keep_drift, law=self.law, **how), rig
 
@@ -93,28 +93,20 @@ def _part(parts: "Iterator[tuple[Recording, ...]]", which: int | None) -> "tuple
     """The part that was asked for, or the only one."""
     count = 0
     for count, lockins in enumerate(parts, 1):
+        if count == (which or 1):
+            found = lockins
         if count == which:
-            return lockins
-        if which is None and count == 1:
-            only = lockins
+            return found
+    _refuse(which, "part", count, "parts, with pauses between them or too long for one")
+    return found
+
+
+def _refuse(which: int | None, option: str, count: int, words: str) -> None:
+    """Refuse a number beyond a count, and none where several are there."""
     if which is None and count > 1:
-        raise BadInput(
-            f"{count} parts, with pauses between them or too long for one; choose one with --part 1 to {count}"
-        )
-    if which is not None:
-        raise BadInput(f"--part {which}: expected 1{f' to {count}' if count > 1 else ', the only one'}")
-    return only
-
-
-def _chosen(lockins: "tuple[Recording, ...]", lockin: int | None) -> int:
-    """Number of the chosen lock-in, from 0."""
-    if lockin is None and len(lockins) > 1:
-        raise BadInput(f"{len(lockins)} lock-ins; choose one with --lockin 1 to {len(lockins)}")
-    if lockin is not None and lockin > len(lockins):
-        raise BadInput(
-            f"--lockin {lockin}: expected 1{f' to {len(lockins)}' if len(lockins) > 1 else ', the only one'}"
-        )
-    return (lockin or 1) - 1
+        raise BadInput(f"{count} {words}; choose one with --{option} 1 to {count}")
+    if which is not None and which > count:
+        raise BadInput(f"--{option} {which}: expected 1{f' to {count}' if count > 1 else ', the only one'}")
 
 
 def name_of(what: str) -> str:
@@ -354,27 +346,16 @@ def _live(measured: str, *, rate_hz: Rate, cutoff_hz: Cutoff = None) -> None:
     rate_hz : HZ
         Rows per second.
     """
+    from sensorgen.core.document import csv_row
     from sensorgen.measure.readings import readings
     from sensorgen.measure.signal.lowpass import CUTOFF_HZ, Live
 
     smooth = Live(rate_hz, cutoff_hz or CUTOFF_HZ)
     with readings(measured) as source:
-        render.say(_header(source))
+        tones = (units.frequency_text(float(f)) for f in source.frequency_hz)
+        head = csv_row([*source.kept, *(f"{part}_ohm_{f}" for f in tones for part in ("re", "im"))])
+        render.say(head, nl=False)
         for block in source.blocks():
-            render.say("".join(_rows(block, smooth(block.impedance_ohm))), nl=False)
-
-
-def _header(source: "Readings") -> str:
-    tones = (units.frequency_text(float(f)) for f in source.frequency_hz)
-    return ",".join([*map(_cell, source.kept), *(f"{part}_ohm_{f}" for f in tones for part in ("re", "im"))])
-
-
-def _rows(block: "FileRows", smooth: "Complex") -> Iterator[str]:
-    for beside, row in zip(block.kept, smooth.tolist(), strict=True):
-        parts = (f"{part:.12g}" if isfinite(z.real) else "" for z in row for part in (z.real, z.imag))
-        yield ",".join([*map(_cell, beside), *parts]) + "\n"
-
-
-def _cell(text: str) -> str:
-    """A cell as CSV; quoted where it would come apart."""
-    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
+            for beside, row in zip(block.kept, smooth(block.impedance_ohm).tolist(), strict=True):
+                parts = (f"{part:.12g}" if isfinite(z.real) else "" for z in row for part in (z.real, z.imag))
+                render.say(csv_row([*beside, *parts]), nl=False)

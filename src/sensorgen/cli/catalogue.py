@@ -127,15 +127,8 @@ def _text(file: packs.File) -> str | None:
 def _printer(p: printer.Printer) -> ListEntry:
     bed = f"bed {p.bed_mm[0]:g} x {p.bed_mm[1]:g} mm, height {p.height_mm:g} mm, nozzle {p.nozzle_mm:g} mm"
     tools = ", ".join(f"{material} on {tool}" for material, tool in p.default_tools.items())
-    return ListEntry(
-        p.title,
-        (
-            bed,
-            f"tools {list(p.tool_numbers)}: {tools}",
-            f"heights of two tools equal to {p.tool_height_error_mm:g} mm",
-            f"source: {p.source}",
-        ),
-    )
+    equal = f"heights of two tools equal to {p.tool_height_error_mm:g} mm"
+    return ListEntry(p.title, (bed, f"tools {list(p.tool_numbers)}: {tools}", equal, f"source: {p.source}"))
 
 
 def qualities() -> Catalogue:
@@ -216,18 +209,12 @@ def schema() -> dict[str, Any]:
     slots["electrode"] = slots["top_electrode"] | {"description": "Both electrodes.", "default": None}
     schema["properties"]["parameters"] = {"type": "object"}
     schema["allOf"] = [
-        {"if": {"properties": {"shape": {"const": n}}}, "then": {"properties": {"parameters": _parameters(p)}}}
+        {"if": {"properties": {"shape": {"const": n}}}, "then": {"properties": {"parameters": {
+            "type": "object", "additionalProperties": False, "properties": {f.name: _property(f) for f in fields(p)},
+        }}}}
         for n, p in shapes.items()
-    ]
+    ]  # fmt: skip
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "sensorgen design"}
-
-
-def _parameters(params: type[Envelope]) -> dict[str, Any]:
-    return {
-        "type": "object",
-        "additionalProperties": False,
-        "properties": {f.name: _property(f) for f in fields(params)},
-    }
 
 
 def _property(field: Field[Any]) -> dict[str, Any]:

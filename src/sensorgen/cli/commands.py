@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 
 class Word(click.ParamType):  # type: ignore[type-arg]
-    """A word as typed, read by :meth:`read`; errors name the option."""
+    """A word as typed, read by a function; errors name the option."""
 
-    def read(self, text: str) -> Any:
-        """Read what was typed."""
-        raise NotImplementedError
+    def __init__(self, name: str, read: Callable[[str], Any]) -> None:
+        """Word with a placeholder, and what reads it."""
+        self.name, self.read = name, read
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
         """Read a text; a value that is none was read before."""
@@ -39,30 +39,15 @@ class Word(click.ParamType):  # type: ignore[type-arg]
             raise error.within(_said(param)) from None
 
 
-class Length(Word):
-    """A length, in millimetres unless it names another unit."""
-
-    name = "mm"
-
-    def read(self, text: str) -> float:
-        """Read a length [mm]."""
-        return units.length_mm(text)
-
-
-class TipWords(Word):
-    """A tip: lengths, and what it is made of, with commas."""
-
-    name = "WIDTH,BLOCK,HEIGHT"
-
-    def read(self, text: str) -> dict[str, Any]:
-        """Read ``5mm,stiff`` or ``10,ninjaflex,10`` as keys of a design file's tip."""
-        tip: dict[str, Any] = {}
-        for word in text.replace(" ", ",").split(","):
-            key = "block" if word[:1].isalpha() else "height_mm" if "block" in tip else "width_mm"
-            if not word or key in tip:
-                raise BadInput(f"{text!r:.60}: expected as 10mm, 5mm,stiff, even or 10mm,ninjaflex,10mm")
-            tip[key] = word if key == "block" else units.length_mm(word)
-        return tip
+def _tip(text: str) -> dict[str, Any]:
+    """Read ``5mm,stiff`` or ``10,ninjaflex,10`` as keys of a design file's tip."""
+    tip: dict[str, Any] = {}
+    for word in text.replace(" ", ",").split(","):
+        key = "block" if word[:1].isalpha() else "height_mm" if "block" in tip else "width_mm"
+        if not word or key in tip:
+            raise BadInput(f"{text!r:.60}: expected as 10mm, 5mm,stiff, even or 10mm,ninjaflex,10mm")
+        tip[key] = word if key == "block" else units.length_mm(word)
+    return tip
 
 
 class NumberRange(click.FloatRange):
@@ -79,9 +64,10 @@ class Values(Word):
 
     def __init__(self, quantity: units.Quantity, *, zero: bool) -> None:
         """Numbers of ``quantity``, 0 with ``zero``."""
-        self.quantity, self.zero, self.name = quantity, zero, f"START:STOP:STEP|{quantity.name.upper()},..."
+        super().__init__(f"START:STOP:STEP|{quantity.name.upper()},...", self.numbers)
+        self.quantity, self.zero = quantity, zero
 
-    def read(self, text: str) -> Any:
+    def numbers(self, text: str) -> Any:
         """Read the numbers, in the quantity's first unit, rising."""
         numbers = units.values(text, self.quantity)
         if numbers[0] < 0 or (numbers[0] == 0 and not self.zero):
@@ -95,30 +81,25 @@ class ShownValue(Values):
     def __init__(self, quantity: units.Quantity, *, zero: bool, unit: str) -> None:
         """Number of ``quantity`` in a unit, 0 with ``zero``."""
         super().__init__(quantity, zero=zero)
-        self.name = unit.upper()
+        self.name, self.read = unit.upper(), self.number
 
-    def read(self, text: str) -> float:
+    def number(self, text: str) -> float:
         """Read the number, in the quantity's first unit."""
-        numbers = super().read(text)
+        numbers = self.numbers(text)
         if len(numbers) != 1:
             raise BadInput(f"{len(numbers)} values; expected one")
         return float(numbers[0])
 
 
-class ShownShare(Word):
-    """A share of one, also in percent."""
-
-    name = "share"
-
-    def read(self, text: str) -> float:
-        """Read ``0.2`` or ``20%`` [-]."""
-        try:
-            return float(text[:-1]) / 100 if text.endswith("%") else float(text)
-        except ValueError:
-            raise BadInput(f"{text!r} is not a share; expected 0.2 or 20%") from None
+def _share(text: str) -> float:
+    """Read ``0.2`` or ``20%`` [-]."""
+    try:
+        return float(text[:-1]) / 100 if text.endswith("%") else float(text)
+    except ValueError:
+        raise BadInput(f"{text!r} is not a share; expected 0.2 or 20%") from None
 
 
-class ProperShare(ShownShare):
+class ProperShare(Word):
     """A share that is neither nothing nor all."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
@@ -129,74 +110,55 @@ class ProperShare(ShownShare):
         return share
 
 
-class Ratio(Word):
-    """A number above 0, as a relative width or error."""
-
-    name = "number"
-
-    def __init__(self, expected: str = "a number above 0, as 1e-4") -> None:
-        """Number that is ``expected``."""
-        self.expected = expected
-
-    def read(self, text: str) -> float:
-        """Read ``1e-4`` [-]."""
-        try:
-            number = float(text)
-        except ValueError:
-            raise BadInput(f"{text!r} is not a number; expected {self.expected}") from None
-        if not 0 < number < inf:
-            raise BadInput(f"{number:g}; expected {self.expected}")
-        return number
+def _above_0(text: str, expected: str = "a number above 0, as 1e-4") -> float:
+    """Read ``1e-4`` [-]."""
+    try:
+        number = float(text)
+    except ValueError:
+        raise BadInput(f"{text!r} is not a number; expected {expected}") from None
+    if not 0 < number < inf:
+        raise BadInput(f"{number:g}; expected {expected}")
+    return number
 
 
-class Pad(Word):
-    """A rectangle on the sheet, or a stretch of an edge where it has no width."""
-
-    name = "X0-X1,Y0-Y1"
-
-    def read(self, text: str) -> Any:
-        """Read ``90-100,0-10``, or ``0,20-60`` for a stretch of an edge [mm]."""
-        spans = [span.split("-") for span in text.split(",")]
-        if len(spans) != 2 or any(len(span) > 2 for span in spans):
-            raise BadInput(f"{text!r}; expected {self.name} in mm, as in 90-100,0-10, or 0,20-60 on an edge")
-        with within(repr(text)):
-            return tuple((units.length_mm(span[0]), units.length_mm(span[-1])) for span in spans)
+_PAD = "X0-X1,Y0-Y1"
 
 
-class Png(Word):
-    """A picture to draw; refused before the work where it cannot be made."""
+def _pad(text: str) -> Any:
+    """Read a rectangle on the sheet, ``90-100,0-10``, or ``0,20-60`` for a stretch of an edge [mm]."""
+    spans = [span.split("-") for span in text.split(",")]
+    if len(spans) != 2 or any(len(span) > 2 for span in spans):
+        raise BadInput(f"{text!r}; expected {_PAD} in mm, as in 90-100,0-10, or 0,20-60 on an edge")
+    with within(repr(text)):
+        return tuple((units.length_mm(span[0]), units.length_mm(span[-1])) for span in spans)
 
-    name = "FILE.png"
 
-    def read(self, text: str) -> Path:
-        """Take a file that ends in .png; raise MissingValue where Matplotlib is not installed."""
-        if not text.lower().endswith(".png"):
-            raise BadInput(f"{text}: expected a file that ends in .png")
-        from sensorgen.analysis.plots.figure import needed
+def _png(text: str) -> Path:
+    """Take a file that ends in .png; raise MissingValue before the work where Matplotlib is not installed."""
+    if not text.lower().endswith(".png"):
+        raise BadInput(f"{text}: expected a file that ends in .png")
+    from sensorgen.analysis.plots.figure import needed
 
-        needed("matplotlib")
-        return Path(text)
+    needed("matplotlib")
+    return Path(text)
 
 
 _ENDINGS = {".3mf", ".csv", ".gcode", ".html", ".json", ".md", ".step", ".stl", ".svg", ".txt", ".yaml", ".zip"}
 
 
-class Folder(Word):
-    """Folder that a command writes into: no name of a file."""
-
-    name = "DIR"
-
-    def read(self, text: str) -> Path:
-        """Take any name but that of a file that sensorgen writes."""
-        folder = Path(text)
-        if folder.suffix.lower() in _ENDINGS and not folder.is_dir():
-            raise BadInput(f"{text!r} is the name of a file; expected a folder, in which files are named by the design")
-        return folder
+def _folder(text: str) -> Path:
+    """Take any name of a folder to write into but that of a file that sensorgen writes."""
+    folder = Path(text)
+    if folder.suffix.lower() in _ENDINGS and not folder.is_dir():
+        raise BadInput(f"{text!r} is the name of a file; expected a folder, in which files are named by the design")
+    return folder
 
 
 KINDS: dict[str, Word] = {  # by the names that annotations have for them
-    "length": Length(), "share": ShownShare(), "proper share": ProperShare(), "ratio": Ratio(),
-    "seconds": Ratio("seconds above 0"), "tip": TipWords(), "pad": Pad(), "png": Png(), "folder": Folder(),
+    "length": Word("mm", units.length_mm), "share": Word("share", _share), "png": Word("FILE.png", _png),
+    "proper share": ProperShare("share", _share), "ratio": Word("number", _above_0), "pad": Word(_PAD, _pad),
+    "seconds": Word("number", partial(_above_0, expected="seconds above 0")), "folder": Word("DIR", _folder),
+    "tip": Word("WIDTH,BLOCK,HEIGHT", _tip),
 }  # fmt: skip
 
 

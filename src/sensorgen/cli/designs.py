@@ -13,19 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import click
 
-from sensorgen.cli import render
-from sensorgen.cli.commands import (
-    FirstWord,
-    Length,
-    OneOf,
-    Work,
-    arguments,
-    completed,
-    described,
-    ended,
-    options_of,
-    pairs,
-)
+from sensorgen.cli import commands, render
+from sensorgen.cli.commands import arguments, completed, options_of
 from sensorgen.cli.options import DesignTip
 from sensorgen.core import lazy as registry
 from sensorgen.core import units
@@ -53,11 +42,11 @@ class _TipOption:
     tip: DesignTip = None
 
 
-class DesignGroup(FirstWord):
+class DesignGroup(commands.FirstWord):
     """A command whose first word is a shape or a design file; each shape brings its own options."""
 
     def __init__(
-        self, name: str, work: Work, *more: click.Parameter, tip: bool = False, parts: Parts | None = None,
+        self, name: str, work: commands.Work, *more: click.Parameter, tip: bool = False, parts: Parts | None = None,
         **attributes: Any,
     ) -> None:  # fmt: skip
         """Command of a function, which gets the design and the values of its own options; ``more`` come after them.
@@ -107,7 +96,7 @@ class DesignGroup(FirstWord):
             given["tip"] = own.pop("tip", None)
             parts = list(self.parts(_design(base, given, name), own))
             _refuse_one_result(len(parts), own)
-            return max(ended(self.work(part, **arguments(self.work, own))) for part in parts)
+            return max(commands.ended(self.work(part, **arguments(self.work, own))) for part in parts)
 
         others = [*options_of(DesignOptions), *self.own]
         taken = {"--help", *(word for other in others for word in other.opts)}
@@ -120,11 +109,11 @@ class DesignGroup(FirstWord):
 def of_design(
     name: str, *more: click.Parameter, tip: bool = False, group: click.Group | None = None, about: str = "",
     **attributes: Any,
-) -> Callable[[Work], DesignGroup]:  # fmt: skip
+) -> Callable[[commands.Work], DesignGroup]:  # fmt: skip
     """Make a command on designs of a function; with ``tip``, its designs may be given another one that presses."""
 
-    def made(work: Work) -> DesignGroup:
-        one = DesignGroup(name, work, *more, tip=tip, help=about or described(work)[0], **attributes)
+    def made(work: commands.Work) -> DesignGroup:
+        one = DesignGroup(name, work, *more, tip=tip, help=about or commands.described(work)[0], **attributes)
         if group is not None:
             group.add_command(one)
         return one
@@ -204,8 +193,8 @@ def _parameter_options(params: type, taken: set[str]) -> list[click.Parameter]:
 def _kind(field: "dataclasses.Field[Any]") -> "click.ParamType[Any]":
     """Kind of a parameter's words: one of its choices, a number, or a length."""
     if choices := field.metadata.get("choices"):
-        return OneOf(choices)
-    return click.FLOAT if field.name.endswith("_deg") or field.metadata.get("count") else Length()
+        return commands.OneOf(choices)
+    return click.FLOAT if field.name.endswith("_deg") or field.metadata.get("count") else commands.KINDS["length"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -264,14 +253,14 @@ class DesignOptions:
     def changes(self, base: Data) -> Data:
         """The part of a design file that the options stand for; None or {} of what was not given."""
         slots: Data = {}
-        for part, value in pairs(self.material, "--material"):
+        for part, value in commands.pairs(self.material, "--material"):
             slots |= {"top_electrode": value, "bottom_electrode": value} if part == "electrode" else {part: value}
         if self.support is not None:
             slots["support"] = None if self.support == "none" else self.support
         return {
             "parameters": {} if self.size is None else _size(self.size),
             "materials": slots,
-            "tools": {key: _number(value, "--tool", int) for key, value in pairs(self.tool, "--tool")},
+            "tools": {key: _number(value, "--tool", int) for key, value in commands.pairs(self.tool, "--tool")},
             "infill": self._infill(_dielectric(base, slots)),
             "border": None if self.border is None else str(Path(self.border).absolute()),
             **{key: getattr(self, key) for key in ("orientation", "printer", "quality", "nozzle_mm", "shrinkage")},
@@ -303,7 +292,7 @@ def _design(base: Data, given: Data, word: str) -> "Design":
     chosen = DesignOptions(**arguments(DesignOptions, given))
     parameters = _of_shape(given)
     data = settings.merged(unnamed, _given(chosen.changes(base) | {"tip": given["tip"]}, parameters))
-    for key, value in pairs(chosen.settings, "--set"):
+    for key, value in commands.pairs(chosen.settings, "--set"):
         data = settings.merged(data, settings.setting(key, value, set(parameters)))
     if chosen.name is not None:
         data["name"] = chosen.name

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from sensorgen.core.document import Documented
     from sensorgen.design.design import Design
+    from sensorgen.workflows.sealed import Differences
 
 
 def _tiles(design: "Design", _: dict[str, Any]) -> "Sequence[Design]":
@@ -107,7 +108,10 @@ def build_command(
     from sensorgen.workflows.build import STEPS, Built, DetailedBuild, build
 
     if verify:
-        return _verify_build(design, out / design.name)
+        from sensorgen.workflows.sealed import build_differences
+
+        with LogFile().existing() as log:
+            return _told(build_differences(out / design.name, design, log))
     asked = design
     design, changes = compensated(design, compensate, design.walls)
     kind, budget_s = DetailedBuild if details else Built, advising.budget if advise or advising.apply else None
@@ -143,12 +147,8 @@ def _refuse(design: "Design", error: Unprintable, budget_s: float | None, advisi
     return FOUND_ERRORS  # of the design as it was: the file has another one now
 
 
-def _verify_build(design: "Design", folder: Path) -> int:
-    from sensorgen.cli.options import LogFile
-    from sensorgen.workflows.sealed import build_differences
-
-    with LogFile().existing() as log:
-        differences = build_differences(folder, design, log)
+def _told(differences: "Differences") -> int:
+    """Deliver how a folder differs from its record; the exit code."""
     render.deliver(differences)
     return FOUND_ERRORS if differences else 0
 
@@ -298,6 +298,4 @@ def _verify_batch(folder: Path, log: LogFile) -> int:
     from sensorgen.workflows.sealed import batch_differences
 
     with log.existing() as rows:
-        differences = batch_differences(folder, RECORD, rows)
-    render.deliver(differences)
-    return FOUND_ERRORS if differences else 0
+        return _told(batch_differences(folder, RECORD, rows))

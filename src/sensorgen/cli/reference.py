@@ -123,9 +123,10 @@ def schema_command(
 
         schema = {**head, **Experiment.model_json_schema()}
     else:
-        from sensorgen.prediction.results import adapter
+        from sensorgen.core.records import adapter
+        from sensorgen.prediction.results import Prediction
 
-        schema = adapter().json_schema(mode="serialization")
+        schema = adapter(Prediction).json_schema(mode="serialization")
     render.write([json.dumps(schema, indent=2, ensure_ascii=False), "\n"])
 
 

@@ -4,7 +4,7 @@ import re
 from functools import singledispatch
 from html import escape
 from io import StringIO
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -54,6 +54,12 @@ def html(thing: object) -> str:
 def figure(thing: object) -> Any:
     """A result as a matplotlib figure; raises TypeError where it has none."""
     raise TypeError(f"{type(thing).__name__} has no figure")
+
+
+class Boundless:
+    """A record whose JSON has "Infinity" where it is infinite; others have null."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
 
 class Displayed:

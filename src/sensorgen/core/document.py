@@ -371,6 +371,19 @@ def to_json(result: Any) -> str:
     return TypeAdapter(kind).dump_json(tuple(result) if many else result, indent=2).decode() + "\n"
 
 
+def apart(*blocks: Iterable[Part]) -> Iterator[Part]:
+    """Blocks below others, each behind an empty line; those that hold nothing are left out."""
+    for block in blocks:
+        parts = list(block)
+        yield from ["", *parts] if parts else ()
+
+
+def csv_row(cells: Iterable[str]) -> str:
+    """Words as a row of CSV, quoted where they would come apart."""
+    quoted = ('"' + c.replace('"', '""') + '"' if any(mark in c for mark in ',"\r\n') else c for c in cells)
+    return ",".join(quoted) + "\n"
+
+
 def comma_separated(table: Table) -> str:
     """A table as CSV with all digits and all columns."""
     target = io.StringIO(newline="")

@@ -1,49 +1,19 @@
 """Plain data from a file, validated against a record type; faults become our errors."""
 
+import json
 import reprlib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from itertools import zip_longest
+from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from sensorgen.core.errors import BadInput, UnknownName
 
-_MAPPING, _LIST, _WHOLE, _TEXT = "a mapping of names to values", "a list", "a whole number", "text"
-_EXPECTED = {
-    "bool_parsing": "true or false",
-    "bool_type": "true or false",
-    "dataclass_type": _MAPPING,
-    "dict_type": _MAPPING,
-    "enum": "{expected}",
-    "finite_number": "a finite number",
-    "float_parsing": "a number",
-    "float_type": "a number",
-    "greater_than": "a number above {gt:g}",
-    "greater_than_equal": "{ge:g} or more",
-    "int_from_float": _WHOLE,
-    "int_parsing": _WHOLE,
-    "int_parsing_size": "a smaller whole number",
-    "int_type": _WHOLE,
-    "invalid_key": "text as its keys",
-    "json_invalid": "JSON",
-    "less_than": "a number below {lt:g}",
-    "less_than_equal": "{le:g} or less",
-    "list_type": _LIST,
-    "literal_error": "{expected}",
-    "mapping_type": _MAPPING,
-    "model_type": _MAPPING,
-    "multiple_of": "a multiple of {multiple_of:g}",
-    "none_required": "nothing, or ~",
-    "string_pattern_mismatch": "text such as {example}",
-    "string_too_long": "at most {max_length} characters",
-    "string_too_short": "at least {min_length} characters",
-    "string_type": _TEXT,
-    "too_long": "at most {max_length} entries",
-    "too_short": "at least {min_length} entries",
-    "tuple_type": _LIST,
-}
+# By pydantic's name of a fault, what was expected
+_EXPECTED: dict[str, str] = json.loads(Path(__file__).with_name("expected.json").read_text("utf-8"))
 _OTHERS = "another kind of value"  # that no file of ours can have
 
 

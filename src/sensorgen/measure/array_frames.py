@@ -387,8 +387,11 @@ def _session(
         free = np.where((of < 0) & (known == 0), 0.0, np.nan)  # a cover spreads a press: others are not known
         pressure = np.where(np.arange(values.shape[1]) == of[:, None], known[:, None], free[:, None])
         force = nothing
+    rest = _rest(data, count)
+    if "element" not in data and np.isfinite(pressure[rest]).any():
+        pressure = pressure - np.nanmean(pressure[rest])  # the gauge's zero
     pressure = np.array(np.broadcast_to(pressure.reshape(count, -1), values.shape))
-    return ArraySession(name, day, time_s, values, _rest(data, count), pressure, force, area, tuple(names))
+    return ArraySession(name, day, time_s, values, rest, pressure, force, area, tuple(names))
 
 
 def _numbers_of(words: np.ndarray, names: Sequence[str], count: int) -> np.ndarray:

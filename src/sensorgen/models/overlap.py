@@ -28,7 +28,6 @@ _ABOVE = (2.0, 4.0, 8.0, 16.0, 32.0)
 _RINGS = 6  # of such a distance
 _QUARTER = 8  # chords of a quarter of a circle
 _GRID_MM = 1e-6
-_FLOATS = -1.0  # in place of a permittivity: a conductor that floats
 
 
 def why_not_applicable(scene: Scene) -> str | None:

@@ -17,7 +17,7 @@ from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.solvers.contact.bricks import Bricks, bricks_of
 from sensorgen.solvers.contact.mapped_field import FieldOrders
-from sensorgen.solvers.contact.pressed import Elastic, LoadSteps, Pressed, check, compared, solve, with_capacitances
+from sensorgen.solvers.contact.pressed import Elastic, LoadSteps, Pressed, check, solve, with_capacitances
 
 if TYPE_CHECKING:
     from sensorgen.solvers.contact.bricks import BrickMesh
@@ -28,17 +28,6 @@ SOURCE = (
     "Dirichlet's and Thomson's principles on the boxes as drawn"
 )
 COST = 3
-
-__all__ = [
-    "BoundaryConditions",
-    "BrickCounts",
-    "Elastic",
-    "Pressed",
-    "cell",
-    "compared",
-    "press",
-    "why_not_applicable",
-]  # fmt: skip
 
 _STEP = 1 / 60  # longest load step over the least Young's modulus: 100 kPa for 6 MPa [-]
 _MOST = 4000  # solid bricks: more would take hours

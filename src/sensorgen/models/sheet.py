@@ -9,23 +9,8 @@ from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import UnknownName
-from sensorgen.solvers.sheet.parts import Contact, Port, Sheet, SheetPatch
-from sensorgen.solvers.sheet.solve import BY, PressErrors, Solution, bounds, contact_sets, depth_m, solution
-
-__all__ = [
-    "BY",
-    "Contact",
-    "Port",
-    "PressErrors",
-    "Sheet",
-    "SheetPatch",
-    "Solution",
-    "contact_sets",
-    "depth_m",
-    "impedance",
-    "localise",
-    "solve",
-]  # fmt: skip
+from sensorgen.solvers.sheet.parts import Port, Sheet, SheetPatch
+from sensorgen.solvers.sheet.solve import BY, PressErrors, Solution, bounds, solution
 
 SOURCE = "Thesis 7.2.6, and appendix B with current in both directions of the plane"
 COST = 2
@@ -134,6 +119,7 @@ def solve(
     Examples
     --------
     >>> plate = Sheet(0.1, 0.1, (900.0, 900.0), 7e-8)
+    >>> from sensorgen.solvers.sheet.parts import Contact
     >>> corner = tuple(Contact(side, (0.0, 0.01), (0.0, 0.01)) for side in ("top", "bottom"))
     >>> press = SheetPatch(0.02, 0.03, 0.02, 0.02, capacitance_factor=1.05)
     >>> found = solve(plate, [corner], [1e5], press, of=["x_m"])
@@ -195,6 +181,7 @@ def localise(
     --------
     One port and one frequency give two numbers, and the press has three unknowns:
 
+    >>> from sensorgen.solvers.sheet.solve import contact_sets
     >>> film = Sheet(0.1, 0.1, (450.0, 450.0), 7e-8)
     >>> tip = SheetPatch(0.0, 0.0, 0.02, 0.02, capacitance_factor=1.05)
     >>> found = localise(film, contact_sets(film)["one-edge"], [1e5], tip, {"capacitance_factor": 0.01}, places=1)

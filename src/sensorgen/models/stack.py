@@ -13,35 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.solvers import multiline
 from sensorgen.solvers.line.inputs import check_fit, numbers, passive
-from sensorgen.solvers.multiline import (
-    GroundTie,
-    LineMatrices,
-    Touch,
-    diagonal,
-    directions,
-    inverse,
-    loops,
-    march,
-    reading,
-    side_by_side,
-    standard_errors,
-    with_body,
-)
-
-__all__ = [
-    "Film",
-    "GroundTie",
-    "Press",
-    "Stack",
-    "StackResponse",
-    "Touch",
-    "Track",
-    "admittance",
-    "impedance",
-    "port",
-    "standard_errors",
-]  # fmt: skip
+from sensorgen.solvers.multiline import GroundTie, LineMatrices, Touch, diagonal, directions, inverse, loops
 
 SOURCE = "Coupled lines (telegrapher's equations in matrices), joined as doubling does it for Riccati's equation"
 COST = 0
@@ -106,14 +80,14 @@ def admittance(
         raise BadInput(
             f"{len(r_ohm_per_m)} resistances, {len(y_s_per_m)} admittances and {len(length_m)} lengths make no sections"
         )
-    tracks = [side_by_side("resistance", section) for section in r_ohm_per_m]
-    films = [side_by_side("admittance", section) for section in y_s_per_m]
+    tracks = [multiline.side_by_side("resistance", section) for section in r_ohm_per_m]
+    films = [multiline.side_by_side("admittance", section) for section in y_s_per_m]
     if any(r.shape[-1] != y.shape[-1] + 1 for r, y in zip(tracks, films, strict=True)):
         raise BadInput("a stack of n films has n + 1 tracks, in every section")
     lengths = [passive("length", length) for length in length_m]
     check_fit("the stack's values", [*lengths, *(section[..., 0] for section in (*tracks, *films))])
     lines = [LineMatrices(loops(r).astype(complex), diagonal(y)) for r, y in zip(tracks, films, strict=True)]
-    return march(lines, lengths)[0]
+    return multiline.march(lines, lengths)[0]
 
 
 def port(upper: int, lower: int, films: int) -> Real:
@@ -232,7 +206,13 @@ class Stack:
         return impedance(*self.sections(frequency_hz, press))
 
     def touched(
-        self, frequency_hz: ArrayLike, touch: Touch, body: GroundTie, driven: int, low: int, bridge: bool = True
+        self,
+        frequency_hz: ArrayLike,
+        touch: Touch,
+        body: GroundTie,
+        driven: int,
+        low: int,
+        bridge: bool = True,
     ) -> Complex:
         """Impedance that an instrument reads between two tracks while a body touches the top [ohm].
 
@@ -256,10 +236,12 @@ class Stack:
         if not (np.min(frequency_hz) > 0 and touch.isolation_f_per_m > 0 and min(body) > 0):
             raise OutOfRange("a touch needs a frequency, an isolation's capacitance and a body, all above 0")
         r, y, lengths = self.sections(frequency_hz, Press(touch.force_n, touch.left_m, touch.length_m))
-        r, y = with_body(r, y, touch.admittance_s_per_m(frequency_hz, body))
+        r, y = multiline.with_body(r, y, touch.admittance_s_per_m(frequency_hz, body))
         n = len(self.films) + 1
         across = port(driven, low, n) if driven > low else -port(low, driven, n)
-        return reading(admittance(r, y, lengths), across, port(n, low, n), body.admittance_s(frequency_hz), bridge)
+        return multiline.reading(
+            admittance(r, y, lengths), across, port(n, low, n), body.admittance_s(frequency_hz), bridge
+        )
 
     def sections(self, frequency_hz: ArrayLike, press: Press) -> tuple[list[Any], list[Any], list[Any]]:
         """Resistances, admittances and lengths left of the tip, under it, and right of it.
@@ -315,8 +297,8 @@ class Stack:
             As :meth:`sections`; also where the impedance is infinite.
         """
         r, y, given = self.sections(frequency_hz, press)
-        series = [loops(side_by_side("resistance", section)).astype(complex) for section in r]
-        shunt = [diagonal(side_by_side("admittance", section)) for section in y]
+        series = [loops(multiline.side_by_side("resistance", section)).astype(complex) for section in r]
+        shunt = [diagonal(multiline.side_by_side("admittance", section)) for section in y]
         lengths = [passive("length", length) for length in given]
         deep = max(*(m.ndim for m in (*series, *shunt)), *(length.ndim + 2 for length in lengths))
         drifts = [[self._by_film(section, k) for k in range(len(self.films))] for section in y]
@@ -333,7 +315,7 @@ class Stack:
             series[1], shunt[1], directions(deep, by_series, 0.0, *still), directions(deep, by_shunt, 0.0, *drifts[1]),
             directions(deep, 0.0, tilt, *still),
         )  # fmt: skip
-        w, by = march(lines, lengths)
+        w, by = multiline.march(lines, lengths)
         z = inverse(w)
         if not np.isfinite(z).all():
             raise OutOfRange("no derivative where the impedance is infinite: give a frequency above 0")

@@ -289,19 +289,9 @@ def capacitance(
     return replace(_of_plain(data), known=known is not None)
 
 
-def weighed(scene: Scene, width: float = inf, model: str = "", lossy: bool = False) -> tuple[PlanCandidate, ...]:
-    """The plan before anything is asked: all models of capacitance in the order in which they would be.
-
-    Parameters
-    ----------
-    scene, width, model : Scene, float, str
-        As of :func:`capacitance`.
-    lossy : bool
-        Whether a dielectric loses.
-    """
-    kind = _LOSSY if lossy else _LOSSLESS
-    plan = _ordered(scene, width, model)
-    return tuple(replace(c, passed_over=c.passed_over or _unfit(c, scene, kind)) for c in plan)
+def weighed(scene: Scene, width: float) -> tuple[PlanCandidate, ...]:
+    """The plan of a width before anything is asked: all models of capacitance in the order in which they would be."""
+    return tuple(replace(c, passed_over=_unfit(c, scene, _LOSSLESS)) for c in _ordered(scene, width, ""))
 
 
 def _ordered(scene: Scene, width: float, model: str) -> list[PlanCandidate]:

@@ -23,21 +23,10 @@ from sensorgen.models import press2d, springs
 from sensorgen.models.compression import curve_of
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.prediction import capacitance_answer as at_rest
+from sensorgen.prediction import mesh_ladder
 from sensorgen.prediction.capacitance import Answer, Unpredictable, capacitance, is_plate
 from sensorgen.prediction.compression_law import case_of, closed_f_per_m2, elastic, gap_m, infill, law_of, under_tops
-from sensorgen.prediction.mesh_ladder import (
-    MODELS,
-    USUAL,
-    VERIFIED,
-    Case,
-    Estimate,
-    MeshLevel,
-    PressedPiece,
-    estimated,
-    mesh_levels,
-    refuse_crushing,
-    why_not_applicable,
-)
+from sensorgen.prediction.mesh_ladder import Case, Estimate, PressedPiece, why_not_applicable
 from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_until_within
 from sensorgen.prediction.sensor_model import piece as piece_of
 from sensorgen.prediction.sweep import Sweeper
@@ -112,7 +101,7 @@ def _law(name: str, design: Design, piece: PressedPiece, stress_pa: Sequence[flo
     known = _at_rest(design, piece)
     if name in PLATES and (not is_plate(known, piece.scene) or _between(piece) != {film(design)}):
         raise BadInput(f"--model {name} applies to a solid plate of one material, {design.shape} is none: try springs")
-    refuse_crushing(
+    mesh_ladder.refuse_crushing(
         stress_pa[-1], {n: taken.value for n, taken in of_all_materials(design, "youngs_modulus_pa").items()}
     )
     law, gap, stress = law_of(design, known, name, printed=piece), gap_m(piece.scene), np.asarray(stress_pa)
@@ -131,19 +120,8 @@ CLOSED_FORMS: dict[str, Callable[[Design, PressedPiece, Sequence[float]], Closed
 FIRST = "springs"  # applies to any scene: the default where no field can be solved
 
 
-__all__ = [
-    "ALL",
-    "BoundaryConditions",
-    "CompressionResult",
-    "PressQuestion",
-    "answer",
-    "planned",
-    "stresses_kpa",
-    "sweep",
-]
-
 Step = Callable[[float], None]
-ALL = (*MODELS, *CLOSED_FORMS)
+ALL = (*mesh_ladder.MODELS, *CLOSED_FORMS)
 
 COLUMNS = (
     Column("stress", "kPa", key="stress_kpa"), Column("displacement", "um", key="displacement_um"),
@@ -348,9 +326,9 @@ def answer(body: Body, asked: PressQuestion, *, step: Step | None = None) -> Com
         if model in CLOSED_FORMS:
             return _closed_form(body, asked, model)
         case = _case(body, asked)
-        estimate = _estimated(case, asked, USUAL, step)
+        estimate = _estimated(case, asked, mesh_ladder.USUAL, step)
         if asked.check_mesh:
-            finer = _estimated(case, asked, USUAL + 1, step)
+            finer = _estimated(case, asked, mesh_ladder.USUAL + 1, step)
             estimate = replace(finer, found=press2d.compared(estimate.found, finer.found))
         return _result(body, case, estimate, asked)
     except NotInstalled as error:
@@ -378,14 +356,14 @@ def planned(body: Body, asked: PressQuestion) -> Plan:
             "--accuracy, or solve one of unlimited cells with --sides symmetric"
         )
     if model in CLOSED_FORMS:
-        why = f"--model {model}" if asked.model else why_not_applicable(piece, MODELS[0])
+        why = f"--model {model}" if asked.model else why_not_applicable(piece, mesh_ladder.MODELS[0])
         raise BadInput(f"an accuracy of C, and {why}: {model} tells {_NO_C}; leave out --accuracy")
     passed_over = [
         PlanCandidate(name, passed_over=f"--model {model}" if asked.model else _unfit(piece, name))
         for name in ALL if name != model
     ]  # fmt: skip
     meshes = _mesh_levels(piece, model, asked)
-    reach = [PlanCandidate(mesh.name, max(mesh.rise_error, VERIFIED), mesh.seconds) for mesh in meshes]
+    reach = [PlanCandidate(mesh.name, max(mesh.rise_error, mesh_ladder.VERIFIED), mesh.seconds) for mesh in meshes]
     candidates = (*passed_over, *reach)
     level = Level("compression", _MEASURE, asked.accuracy, candidates, cheapest(candidates, asked.accuracy))
     return Plan(asked.accuracy, f"the rise of C up to {asked.stress_kpa[-1]:g} kPa", (level,))
@@ -402,11 +380,13 @@ def _model(body: Body, asked: PressQuestion) -> str:
     piece = piece_of(body)
     usual = asked.sides == "bonded" and asked.boundary.period == "fixed"
     law = law_name(body.design, piece) if usual and not asked.model and not asked.check_mesh else ""
-    return law or asked.model or next((name for name in MODELS if not why_not_applicable(piece, name)), FIRST)
+    return (
+        law or asked.model or next((name for name in mesh_ladder.MODELS if not why_not_applicable(piece, name)), FIRST)
+    )
 
 
-def _mesh_levels(piece: PressedPiece, model: str, asked: PressQuestion) -> list[MeshLevel]:
-    return mesh_levels(piece, model, len(asked.stress_kpa) - 1)
+def _mesh_levels(piece: PressedPiece, model: str, asked: PressQuestion) -> list[mesh_ladder.MeshLevel]:
+    return mesh_ladder.mesh_levels(piece, model, len(asked.stress_kpa) - 1)
 
 
 def _within(body: Body, asked: PressQuestion, step: Step | None) -> CompressionResult:
@@ -446,7 +426,7 @@ def _case(body: Body, asked: PressQuestion) -> Case:
 
 def _estimated(case: Case, asked: PressQuestion, level: int, step: Step | None) -> Estimate:
     stress_pa = [_PA_PER_KPA * kpa for kpa in asked.stress_kpa]
-    return estimated(case, stress_pa, level, keep=asked.keep, step=step)
+    return mesh_ladder.estimated(case, stress_pa, level, keep=asked.keep, step=step)
 
 
 def _result(body: Body, case: Case, estimate: Estimate, asked: PressQuestion) -> CompressionResult:

@@ -23,20 +23,9 @@ from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.design.values import MaterialValue, film, material_value, of_all_materials, permittivities
 from sensorgen.models import compression
 from sensorgen.models.compression import CapacitanceCurve, Compression, curve_of, extended
+from sensorgen.prediction import mesh_ladder
 from sensorgen.prediction.capacitance import Answer, is_plate
-from sensorgen.prediction.mesh_ladder import (
-    COARSEST,
-    USUAL,
-    Case,
-    MeshLevel,
-    PressedPiece,
-    coarsest,
-    drawn,
-    estimated,
-    mesh_levels,
-    model_of,
-    pressed,
-)
+from sensorgen.prediction.mesh_ladder import Case, PressedPiece, drawn, pressed
 from sensorgen.prediction.query import FLAT, LAWS
 from sensorgen.scene.scene import Body, Point, Scene, box
 from sensorgen.scene.sections import sections
@@ -143,10 +132,8 @@ def law_of(
 
 def _unsolved(design: Design, soft: MaterialValue, name: str, piece: PressedPiece) -> Law:
     """A cell with gaps as infill where it is like that, else as a plate of its soft material, of unknown error."""
-    by_infill = (
-        infill(design, piece) if name == "infill" or (name != "unconfined" and piece.period_mm is None) else None
-    )
-    if by_infill:
+    may = name == "infill" or (name != "unconfined" and piece.period_mm is None)
+    if may and (by_infill := infill(design, piece)):
         return by_infill
     if name == "infill":
         raise OutOfRange(
@@ -192,7 +179,7 @@ def options(
     known = LawOption(at_once.compression.name, 0.0, at_once, lambda: at_once)
     if at_once.bounded or name == "unconfined":
         return [known]
-    model = model_of(piece, quick=not asked)
+    model = mesh_ladder.model_of(piece, quick=not asked)
     meshes = [
         LawOption(
             mesh.name,
@@ -200,12 +187,12 @@ def options(
             _cell(expected(design, mesh), moduli),
             partial(solved, design, printed, mesh.level, model=model, tip=tip, until_pa=until_pa),
         )
-        for mesh in mesh_levels(piece, model, len(stresses_pa(until_pa)) - 1)
+        for mesh in mesh_ladder.mesh_levels(piece, model, len(stresses_pa(until_pa)) - 1)
     ]
     return meshes if asked else [known, *meshes]
 
 
-def expected(design: Design, mesh: MeshLevel) -> CapacitanceCurve:
+def expected(design: Design, mesh: mesh_ladder.MeshLevel) -> CapacitanceCurve:
     """Estimate of an unknown cell's curve on a mesh: that of the prototype that it resembles."""
     modulus_pa = of_all_materials(design, "youngs_modulus_pa")[film(design)].value
     scale = max(modulus_pa / compression.PROTOTYPE_PA, 1 / compression.REACH)  # softer ones could not be extrapolated
@@ -229,7 +216,7 @@ def nearest(design: Design, piece: PressedPiece, answer: Answer, until_pa: float
     from sensorgen.models import closed
     from sensorgen.models.press2d import BoundaryConditions
 
-    like = expected(design, mesh_levels(piece, "press3d", 1)[0])
+    like = expected(design, mesh_ladder.mesh_levels(piece, "press3d", 1)[0])
     law, last_pa = _cell(like, of_all_materials(design, "youngs_modulus_pa")), like.stress_pa[-1]
     if until_pa <= compression.REACH * last_pa:
         return replace(law, bounded=False)
@@ -293,13 +280,10 @@ def _stored(design: Design, printed: PressedPiece | None) -> CapacitanceCurve | 
         # Estimates; G-code, of which equal slices differ by 4 nm; both as mirror images, as other counts of periods are
         keys = (content(printed, digits, turned=turned) for turned in (False, True) for digits in (6, 3))
         curve = next(filter(None, (compression.solved_print(key, moduli_pa) for key in keys)), None)
-    return curve if curve and _incompressible(design) else None
-
-
-def _incompressible(design: Design) -> bool:
-    """Test whether all materials have the Poisson's ratio of the stored cells."""
+    if not curve:
+        return None
     ratios = (taken.value for taken in of_all_materials(design, "poisson_ratio").values())
-    return all(abs(ratio - compression.SOLVED_RATIO) < _SAME_RATIO for ratio in ratios)
+    return curve if all(abs(ratio - compression.SOLVED_RATIO) < _SAME_RATIO for ratio in ratios) else None
 
 
 def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> str:
@@ -436,7 +420,7 @@ def stresses_pa(until_pa: float) -> tuple[float, ...]:
 def solved(
     design: Design,
     printed: PressedPiece | None = None,
-    level: int = USUAL,
+    level: int = mesh_ladder.USUAL,
     boundary: "BoundaryConditions | None" = None,
     model: str = "",
     *,
@@ -469,10 +453,10 @@ def solved(
     """
     moduli, ratios = of_all_materials(design, "youngs_modulus_pa"), of_all_materials(design, "poisson_ratio")
     piece = printed or drawn(design)
-    model = model or model_of(piece)
+    model = model or mesh_ladder.model_of(piece)
     loads = stresses_pa(until_pa)
     case = _case(design, piece, model, boundary) if boundary else case_of(design, piece, model, tip)
-    estimate = estimated(case, loads, level, sound=True)
+    estimate = mesh_ladder.estimated(case, loads, level, sound=True)
     solution = estimate.found
     if solution.converged_pa < _ENOUGH * STRESS_PA[-1]:
         solution = pressed(case, loads, level)
@@ -560,7 +544,7 @@ def under_tops(
     own : CapacitanceCurve
         Under the tip.
     """
-    loads, level = [own.stress_pa[-1] * share for share in _COARSE], coarsest(model)
+    loads, level = [own.stress_pa[-1] * share for share in _COARSE], mesh_ladder.coarsest(model)
 
     def rise(block: str) -> Real:
         try:
@@ -595,7 +579,7 @@ def _few_pa(stress_pa: float, tip: Tip) -> Real:
 
 def at_a_few_pressures(
     design: Design, printed: PressedPiece, answer: Answer, stress_pa: float, name: str = "", *, tip: Tip = FLAT,
-    level: int = COARSEST,
+    level: int = mesh_ladder.COARSEST,
 ) -> Law | None:  # fmt: skip
     """The stored law of a printed cell; else a section or round cell solved at a few pressures on the coarsest mesh.
 
@@ -626,7 +610,7 @@ def at_a_few_pressures(
     known = law_of(design, answer, name, printed=printed, tip=tip, until_pa=stress_pa)
     if known.bounded:
         return known
-    model = model_of(printed, quick=True)
+    model = mesh_ladder.model_of(printed, quick=True)
     if model == "press3d":
         law = infill(design, printed) or nearest(design, printed, answer, stress_pa)
         return law if law.bounded else None

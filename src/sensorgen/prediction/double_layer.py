@@ -15,10 +15,11 @@ from sensorgen.design.body import Body
 from sensorgen.design.design import Design, make
 from sensorgen.design.values import MaterialValue, material_value
 from sensorgen.models.sensor import Sensor
-from sensorgen.models.stack import Film, GroundTie, Press, Stack, StackResponse, Touch, Track, port, standard_errors
+from sensorgen.models.stack import Film, Press, Stack, StackResponse, Track, port
 from sensorgen.prediction import bodies
 from sensorgen.prediction.query import TIP_M, Query, Tip
 from sensorgen.prediction.sensor_model import sensor_model
+from sensorgen.solvers.multiline import GroundTie, Touch, standard_errors
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ edge may add, and what a reading is exposed to beside the press: the design's ``
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import chain
+from functools import partial
+from itertools import chain, product
 from math import radians, tan
-from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import shapely
@@ -33,7 +33,7 @@ from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.compression_law import CLOSED_FORM, Law, gap_m
 from sensorgen.prediction.query import NOISE, Load
-from sensorgen.prediction.reference_load import Dispersed, ReferenceLoad
+from sensorgen.prediction.reference_load import Assumption, Dispersed, ReferenceLoad
 from sensorgen.prediction.rest_state import added, permittivity_ratios
 from sensorgen.prediction.results import Changes, ErrorBudget, Term
 from sensorgen.prediction.sensor_model import SensorModel, piece
@@ -78,10 +78,12 @@ def error_budget(
         A load that the sensor cannot take.
     """
     reference = ReferenceLoad(model.sensor, load, noise, on_bench)
-    terms = (
-        *_models(model, reference), *_print(model, reference, otherwise, films, layer), *_materials(model, reference),
-        *exposed(model, reference),
+    pressed = reference.force_n > 0
+    assumptions = (
+        *_models(model), *_print(model, otherwise, films, layer), *material_ends(model, reference),
+        *(_exposed(model, reference) if pressed else ()),
     )  # fmt: skip
+    terms = (*map(reference.term, assumptions), *(_read_off(model, reference) if pressed else ()))
     total = Changes()
     for term in terms:
         total = total + (term.changes or Changes())
@@ -95,101 +97,75 @@ def _with_capacitances(model: SensorModel, values_f: Sequence[float]) -> list[Se
     return [replace(model.sensor, capacitance_f_per_m=per_m * value) for value in values_f]
 
 
-def _models(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
-    sensor, law, c = model.sensor, model.law, model.rest.capacitance
+def _models(model: SensorModel) -> Iterator[Assumption]:
+    sensor, c = model.sensor, model.rest.capacitance
+    of = partial(Assumption, kind="model", source=_MODEL)
     ends = _with_capacitances(model, (c.model.lower, c.model.upper))
-    yield reference.term(
-        "cell", f"capacitance between its bounds ({model.rest.answer.model})", "model", ends, source=_MODEL
-    )
-    yield _law_error(sensor, law, reference)
-    yield _boundary(sensor, law, reference)
+    yield of("cell", f"capacitance between its bounds ({model.rest.answer.model})", sensors=ends)
+    yield _law_error(sensor, model.law)
+    yield _boundary(sensor, model.law)
     if sensor.profile == UNIFORM:
-        yield reference.term("line", "one section under the tip is exact", "model", [sensor], source=_MODEL)
+        yield of("line", "one section under the tip is exact", sensors=[sensor])
     else:
         finer = [replace(sensor, pieces=2 * sensor.pieces)]
-        why = f"{sensor.pieces} sections under the tip"
-        yield reference.term("line", why, "model", finer, factor=_RICHARDSON, source=_MODEL)
+        yield of("line", f"{sensor.pieces} sections under the tip", sensors=finer, factor=_RICHARDSON)
     profiles = [replace(sensor, profile=name) for name in PROFILES if name != sensor.profile]
-    what = f"pressure distributed like {', '.join(s.profile for s in profiles)}"
-    yield reference.term("tip", what, "model", profiles, source=_MODEL)
+    yield of("tip", f"pressure distributed like {', '.join(s.profile for s in profiles)}", sensors=profiles)
 
 
-def _law_error(sensor: Sensor, law: Law, reference: ReferenceLoad) -> Term:
+def _law_error(sensor: Sensor, law: Law) -> Assumption:
     """Error of the law of compression itself."""
     why = "error of the law" if law.bounded else "law of a solid plate (B.49) on a cell with gaps: error unknown"
     if law.others and law.others[0].name != law.compression.name:
         why = f"{law.compression.name} or {law.others[0].name}"
-    if not law.bounded:
-        return Term("compression", why, "model", None, source=_MODEL)
-    others = [replace(sensor, compression=o) for o in law.others]
-    return reference.term("compression", why, "model", others, source=_MODEL)
+    others = [replace(sensor, compression=o) for o in law.others] if law.bounded else None
+    return Assumption("compression", why, "model", others, _MODEL)
 
 
-def _boundary(sensor: Sensor, law: Law, reference: ReferenceLoad) -> Term:
+def _boundary(sensor: Sensor, law: Law) -> Assumption:
     """Other boundary conditions: of the top of the cell, of faces in contact, and of its sides."""
     tops = [replace(sensor, compression=o) for o in (*law.tops.values(), *law.other_boundaries)]
     solid = not tops and law.bounded and law.compression.name in CLOSED_FORM
     more = ", faces that stick, or a cell free to widen" if law.other_boundaries else ": layers take both alike" * solid
     what, at_least = f"even pressure or a stiff plate on the top{more}", not solid and len(law.tops) < len(TOPS)
-    return reference.term("boundary", what, "model", tops, at_least=at_least, source=_MODEL)
+    return Assumption("boundary", what, "model", tops, _MODEL, at_least)
 
 
 def _print(
-    model: SensorModel, reference: ReferenceLoad, otherwise: Sequence[Sensor | None], films: Sequence[Sensor | None],
+    model: SensorModel, otherwise: Sequence[Sensor | None], films: Sequence[Sensor | None],
     layer: Sequence[Sensor | None],
-) -> Iterator[Term]:  # fmt: skip
+) -> Iterator[Assumption]:  # fmt: skip
     """Walls, and the film's thickness: by the capacitance, and by the law of compression where that is known."""
-    rest, film, design = model.rest, model.body.cells.film, model.body.design
+    rest, cells, design = model.rest, model.body.cells, model.body.design
     if not model.body.is_drawn:
         turns = by_walls(design)
-        what = (
-            f"line shapes or walls: {', '.join(model.body.cells.scenes)}{'; verdict by estimated walls' * bool(turns)}"
-        )
-        values_f = rest.by_width.lower, rest.by_width.upper
-        yield reference.term(
-            "slicer's walls", what, "print", _ends(model, values_f, otherwise), at_least=None in otherwise,
-            source="slicers" if model.body.cells.tracks else "estimate", turns=turns,
-        )  # fmt: skip
-    if film:
-        by, machine = (rest.by_film.lower, rest.by_film.upper), design.machine.name
+        what = f"line shapes or walls: {', '.join(cells.scenes)}{'; verdict by estimated walls' * bool(turns)}"
+        ends = _ends(model, (rest.by_width.lower, rest.by_width.upper), otherwise)
+        source = "slicers" if cells.tracks else "estimate"
+        yield Assumption("slicer's walls", what, "print", ends, source, None in otherwise, turns=turns)
+    if film := cells.film:
+        ends = _ends(model, (rest.by_film.lower, rest.by_film.upper), films)
         what = f"heights of the tools differ by up to {film.error_mm:g} mm"
-        yield _of_film(reference, "film thickness", what, machine, film.thinner, _ends(model, by, films), films)
-        thinner = _ends(model, (rest.layer_thinner_f,) if film.layer_thinner else (), layer)
+        yield _of_film("film thickness", what, design.machine.name, film.thinner, ends, films)
+        ends = _ends(model, (rest.layer_thinner_f,) if film.layer_thinner else (), layer)
         what = f"by {design.layers.layer_mm:g} mm"
-        yield _of_film(reference, "film a layer thinner", what, GUESS, film.layer_thinner, thinner, layer)
+        yield _of_film("film a layer thinner", what, GUESS, film.layer_thinner, ends, layer)
 
 
 def _of_film(
-    reference: ReferenceLoad, name: str, what: str, source: str, thinnest: Scene | None, ends: Sequence[Sensor],
-    known: Sequence[Sensor | None],
-) -> Term:  # fmt: skip
+    name: str, what: str, source: str, thinnest: Scene | None, ends: Sequence[Sensor], known: Sequence[Sensor | None]
+) -> Assumption:
     """A film at the ends of its thickness; CHANGE where none is left."""
-    what += "" if thinnest else ": none is left"
-    at_least = thinnest is None or None in known
-    turns = "" if thinnest else CHANGE
-    return reference.term(name, what, "print", ends, at_least=at_least, source=source, turns=turns)
+    if thinnest is None:
+        return Assumption(name, f"{what}: none is left", "print", ends, source, at_least=True, turns=CHANGE)
+    return Assumption(name, what, "print", ends, source, at_least=None in known)
 
 
 def _ends(model: SensorModel, values_f: Sequence[float], sensors: Sequence[Sensor | None]) -> list[Sensor]:
     return [*_with_capacitances(model, values_f), *(s for s in sensors if s)]
 
 
-def _materials(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
-    for ends in material_ends(model, reference):
-        yield reference.term(ends.name, ends.what, ends.kind, ends.sensors, at_least=ends.at_least)
-
-
-class Ends(NamedTuple):
-    """An uncertain value of a material or of the leads, and the sensor with it at its ends."""
-
-    name: str
-    what: str
-    sensors: Sequence[Sensor]
-    at_least: bool = False
-    kind: Literal["material", "leads"] = "material"
-
-
-def material_ends(model: SensorModel, reference: ReferenceLoad) -> Iterator[Ends]:
+def material_ends(model: SensorModel, reference: ReferenceLoad) -> Iterator[Assumption]:
     """Uncertain values of materials and leads, of a sensor under the load of the reference."""
     design, sensor = model.body.design, model.sensor
     yield from _electrodes(design, sensor)
@@ -198,32 +174,27 @@ def material_ends(model: SensorModel, reference: ReferenceLoad) -> Iterator[Ends
         value = next(v for v in model.rest.values if v.material == name and v.quantity == "relative_permittivity")
         low, high = spread(design, value)
         ends = [replace(sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * ratio) for ratio in ratios]
-        yield Ends(f"permittivity of {name}", f"{low:.3g} to {high:.3g}", ends)
+        yield Assumption(f"permittivity of {name}", f"{low:.3g} to {high:.3g}", "material", ends)
     farad, ohm = added(model.body)
-    ends = [replace(sensor, lead_f=end) for end in farad[1:]]
-    yield Ends("lead capacitance", f"leads and edge, {_range_text([(1e12 * farad.least, 1e12 * farad.most)])} pF", ends,
-               kind="leads")  # fmt: skip
-    ends = [replace(sensor, lead_ohm=end) for end in ohm[1:]]
-    yield Ends("contact resistance", f"leads and contacts, {_range_text([ohm[1:]])} ohm", ends, kind="leads")
+    what = f"leads and edge, {_range_text([(1e12 * farad.least, 1e12 * farad.most)])} pF"
+    yield Assumption("lead capacitance", what, "leads", [replace(sensor, lead_f=end) for end in farad[1:]])
+    what = f"leads and contacts, {_range_text([ohm[1:]])} ohm"
+    yield Assumption("contact resistance", what, "leads", [replace(sensor, lead_ohm=end) for end in ohm[1:]])
 
 
-def _electrodes(design: Design, sensor: Sensor) -> Iterator[Ends]:
+def _electrodes(design: Design, sensor: Sensor) -> Iterator[Assumption]:
     """Resistivity and piezoresistance of both electrodes at once, where any is uncertain."""
     tracks = [spread(design, value) for value in resistivities(design).values()]
     if any(low < high for low, high in tracks):
         ends = [replace(sensor, resistivity_ohm_m=(a, b)) for a, b in zip(*tracks, strict=True)]
-        yield Ends("resistivity", f"of the electrodes, {_range_text(tracks)} ohm m", ends)
-    rises = [_piezoresistance_range(design, end) for end in ENDS]
+        yield Assumption("resistivity", f"of the electrodes, {_range_text(tracks)} ohm m", "material", ends)
+    rises, given = [], piezoresistance(design)
+    for end in ENDS:  # without a value for one electrode, it may be 0 there
+        none = MaterialValue(design.slot(f"{end}_electrode")[0].name, PIEZORESISTANCE, 0.0, "")
+        rises.append(spread(design, given.get(end, none)))
     if any(low < high for low, high in rises):
         ends = [replace(sensor, piezoresistance_per_pa=(a, b)) for a, b in zip(*rises, strict=True)]
-        yield Ends("piezoresistance", f"of the electrodes, {_range_text(rises)} 1/Pa", ends)
-
-
-def _piezoresistance_range(design: Design, end: str) -> tuple[float, float]:
-    """Without a value for one electrode, it may be 0 there."""
-    material, _ = design.slot(f"{end}_electrode")
-    value = piezoresistance(design).get(end, MaterialValue(material.name, PIEZORESISTANCE, 0.0, ""))
-    return spread(design, value)
+        yield Assumption("piezoresistance", f"of the electrodes, {_range_text(rises)} 1/Pa", "material", ends)
 
 
 def modulus_range(model: SensorModel) -> tuple[float, float, str]:
@@ -249,14 +220,14 @@ def modulus_range(model: SensorModel) -> tuple[float, float, str]:
     return softest, stiffest, ", ".join(parts)
 
 
-def _stiffness(model: SensorModel, reference: ReferenceLoad) -> Iterator[Ends]:
+def _stiffness(model: SensorModel, reference: ReferenceLoad) -> Iterator[Assumption]:
     """All moduli at once, scaled by the largest change that any of them may have."""
     sensor, (softest, stiffest, what) = model.sensor, modulus_range(model)
     if softest < stiffest:
         least = _least_modulus(sensor, softest, reference)
         ends = [replace(sensor, compression=sensor.compression.scaled_modulus(factor)) for factor in (least, stiffest)]
         beyond = f": below {least:.2g} of it the load exceeds the compression law" if least > softest else ""
-        yield Ends("stiffness", what + beyond, ends, at_least=least > softest)
+        yield Assumption("stiffness", what + beyond, "material", ends, at_least=least > softest)
 
 
 def _least_modulus(sensor: Sensor, softest: float, reference: ReferenceLoad) -> float:
@@ -280,38 +251,16 @@ def _range_text(ranges: Sequence[tuple[float, float]]) -> str:
 _EDGE = 0.45  # of the width: farthest that a tip is pressed off the middle
 
 
-class Exposure(NamedTuple):
-    """An effect.
-
-    ``keys`` are the design's of its size, ``sensors`` those at its ends: none where it is left out, None where they
-    are not known. ``since_rest`` if it came after the last reading at rest, ``at_least`` if the law ends below it.
-    """
-
-    keys: tuple[str, ...]
-    name: str
-    what: str
-    kind: Any
-    sensors: Sequence[Sensor] | None
-    since_rest: bool = True
-    at_least: bool = False
-    turns: str = ""
-
-
-def exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
-    """Terms of what a reading depends on beside the press; none without a press."""
+def _exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Assumption]:
+    """Assumptions about a reading beside the press."""
     effects = model.body.design.effects
-    if not reference.force_n > 0:
-        return
-    for one in chain(_drift(effects, model.sensor), _memory(effects, reference), _tip(effects, model, reference),
-                     _first_layer(effects, model)):  # fmt: skip
-        source = effects.source(*one.keys)
-        if one.sensors is None:
-            yield Term(one.name, one.what, one.kind, None, source=source, turns=one.turns)
-        elif one.sensors:
-            yield reference.term(
-                one.name, one.what, one.kind, one.sensors, since_rest=one.since_rest, at_least=one.at_least,
-                source=source, turns=one.turns,
-            )  # fmt: skip
+    parts = _drift(effects, model.sensor), _memory(effects, reference), _tip(model, reference), _first_layer(model)
+    return (one for one in chain(*parts) if one.sensors is None or one.sensors)
+
+
+def _read_off(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
+    """Errors of the meter, and of the person who notes the press."""
+    effects = model.body.design.effects
     if effects.meter:
         gain = Changes(*(effects.meter,) * 5)  # the same at rest: the press is read as it is
         what = f"{effects.meter:.2g} of every reading"
@@ -329,55 +278,58 @@ def exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
         yield Term("person", what, "person", press, source=source, turns=reference.turns(press))
 
 
-def _drift(e: Effects, sensor: Sensor) -> Iterator[Exposure]:
+def _drift(e: Effects, sensor: Sensor) -> Iterator[Assumption]:
     """Drift of permittivity and resistivity since the reading at rest, and their dispersion."""
     causes = ("temperature", "k", "K"), ("humidity", "percent", "% of humidity")
-    for quantity, of in (("permittivity", _permittivity), ("resistivity", _resistivity)):
-        for cause, unit, words in causes:
-            keys = f"{quantity}_per_{unit}", f"{cause}_{unit}"
-            per, change = (getattr(e, key) for key in keys)
-            ends = [of(sensor, 1 + sign * per * change) for sign in (-1, 1) if per * change]
-            what = f"{per * change:.2g} by {change:g} {words} since the reading at rest"
-            yield Exposure(keys, f"{quantity}, {cause}", what, "drift", ends)
+    for quantity, (cause, unit, words) in product(("permittivity", "resistivity"), causes):
+        keys = f"{quantity}_per_{unit}", f"{cause}_{unit}"
+        per, change = (getattr(e, key) for key in keys)
+        factors = [1 + sign * per * change for sign in (-1, 1) if per * change]
+        if quantity == "permittivity":
+            ends = [replace(sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * factor) for factor in factors]
+        else:
+            top, bottom = sensor.resistivity_ohm_m
+            ends = [replace(sensor, resistivity_ohm_m=(top * factor, bottom * factor)) for factor in factors]
+        what = f"{per * change:.2g} by {change:g} {words} since the reading at rest"
+        yield Assumption(f"{quantity}, {cause}", what, "drift", ends, e.source(*keys), since_rest=True)
     n, m = e.permittivity_dispersion, e.resistivity_dispersion
     dispersed = [Dispersed(**vars(sensor), permittivity_power=n, resistivity_power=m)] if n or m else []
-    what = f"permittivity as f^-{n:g}, resistivity as f^-{m:g}"
-    yield Exposure(
-        ("permittivity_dispersion", "resistivity_dispersion"), "dispersion", what, "drift", dispersed, since_rest=False
-    )
+    source = e.source("permittivity_dispersion", "resistivity_dispersion")
+    yield Assumption("dispersion", f"permittivity as f^-{n:g}, resistivity as f^-{m:g}", "drift", dispersed, source)
 
 
-def _memory(e: Effects, reference: ReferenceLoad) -> Iterator[Exposure]:
+def _memory(e: Effects, reference: ReferenceLoad) -> Iterator[Assumption]:
     """Memory of the film: of a higher load, and of the time under this one."""
     for name, share, when in (
         ("hysteresis", e.hysteresis, "after a higher load"), ("creep", e.creep, "under a load that lasts"),
     ):  # fmt: skip
         ends = _with_law(reference, lambda _: np.ones(1), 1 + share) if share else []
-        yield Exposure((name,), name, f"rise of C {share:.2g} larger {when}", "drift", ends)
+        what = f"rise of C {share:.2g} larger {when}"
+        yield Assumption(name, what, "drift", ends, e.source(name), since_rest=True)
 
 
-def _tip(e: Effects, model: SensorModel, reference: ReferenceLoad) -> Iterator[Exposure]:
+def _tip(model: SensorModel, reference: ReferenceLoad) -> Iterator[Assumption]:
     """Piezoresistance under the tip; uneven pressure across the sensor: a tip off the middle, or tilted."""
-    width_m = model.sensor.width_m
+    e, width_m, of = model.body.design.effects, model.sensor.width_m, partial(Assumption, since_rest=True)
     if not model.piezoresistance:
         per_pa = e.piezoresistance / reference.stress_pa()
         changed = [replace(model.sensor, piezoresistance_per_pa=(s * per_pa, s * per_pa)) for s in (-1, 1) if per_pa]
         what = f"resistivity under the tip {e.piezoresistance:g} lower or higher"
-        yield Exposure(("piezoresistance",), "piezoresistance", what, "drift", changed)
+        yield of("piezoresistance", what, "drift", changed, e.source("piezoresistance"))
     if e.off_middle_mm:
         across = pressure.off_middle(min(e.off_middle_mm * M_PER_MM / width_m, _EDGE))
-        ends = _with_law(reference, lambda _: across)
-        yield Exposure(("off_middle_mm",), "tip off the middle", f"by {e.off_middle_mm:g} mm across", "tip", ends)
+        ends, what = _with_law(reference, lambda _: across), f"by {e.off_middle_mm:g} mm across"
+        yield of("tip off the middle", what, "tip", ends, e.source("off_middle_mm"))
     if e.tilt_deg and model.body.design.tip.block != EVEN:
         ends = _tilted(model, reference, tan(radians(e.tilt_deg)) * width_m)
         ended = len(ends or ()) > 1
         what = f"by {e.tilt_deg:g} degrees across{': its edge presses beyond the compression law' * ended}"
-        yield Exposure(("tilt_deg",), "tip tilted", what, "tip", ends, at_least=ended)
+        yield of("tip tilted", what, "tip", ends, e.source("tilt_deg"), at_least=ended)
 
 
-def _first_layer(e: Effects, model: SensorModel) -> Iterator[Exposure]:
+def _first_layer(model: SensorModel) -> Iterator[Assumption]:
     """A bottom electrode thinner than drawn: its first layer squeezed, or the bed uneven."""
-    top, bottom = model.sensor.electrode_m
+    e, (top, bottom) = model.body.design.effects, model.sensor.electrode_m
     for key, least_mm, name in (
         ("squeezed_mm", e.squeezed_mm, "first layer squeezed"), ("bed_mm", e.bed_mm, "bed uneven"),
     ):  # fmt: skip
@@ -385,16 +337,7 @@ def _first_layer(e: Effects, model: SensorModel) -> Iterator[Exposure]:
         ends = None if thinner <= 0 else [replace(model.sensor, electrode_m=(top, thinner))] if least_mm else []
         what = f"by {least_mm:g} mm: bottom electrode thinner"
         turns = by_first_layer(model.body.design, least_mm) if least_mm else ""
-        yield Exposure((key,), name, what, "print", ends, since_rest=False, turns=turns)
-
-
-def _permittivity(sensor: Sensor, factor: float) -> Sensor:
-    return replace(sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * factor)
-
-
-def _resistivity(sensor: Sensor, factor: float) -> Sensor:
-    top, bottom = sensor.resistivity_ohm_m
-    return replace(sensor, resistivity_ohm_m=(top * factor, bottom * factor))
+        yield Assumption(name, what, "print", ends, e.source(key), turns=turns)
 
 
 def _with_law(

@@ -3,10 +3,11 @@
 from dataclasses import asdict, replace
 
 from sensorgen.core import cache
+from sensorgen.core.records import adapter
 from sensorgen.design.body import Body
 from sensorgen.prediction import bodies
 from sensorgen.prediction.query import DEFAULT, Query
-from sensorgen.prediction.results import SCHEMA, Prediction, adapter, from_json
+from sensorgen.prediction.results import SCHEMA, Prediction, from_json
 
 
 def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True, beside: bool = True) -> Prediction:
@@ -42,8 +43,8 @@ def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True, beside: b
 
 def _stored(body: Body, query: Query) -> Prediction:
     question = {"what": "prediction", "body": body.identity, "query": asdict(query), "schema": SCHEMA}
-    prediction = from_json(cache.answer(question, lambda: adapter().dump_json(_computed(body, query)).decode()))
-    return replace(prediction, design=body.design.name, body=body.provenance)
+    text = cache.answer(question, lambda: adapter(Prediction).dump_json(_computed(body, query)).decode())
+    return replace(from_json(text), design=body.design.name, body=body.provenance)
 
 
 def _computed(body: Body, query: Query) -> Prediction:

@@ -7,13 +7,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.core.display import Displayed
-from sensorgen.core.document import Cell, Column, Part, Table
+from sensorgen.core.display import Boundless, Displayed
+from sensorgen.core.document import Cell, Column, Part, Table, apart
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.core.units import M_PER_MM, frequency_text, si
 from sensorgen.design.body import Body
@@ -216,7 +216,7 @@ _SHOWN = (
 
 
 @dataclass(frozen=True)
-class PredictedPoint:
+class PredictedPoint(Boundless):
     """A prediction at one value of a sweep.
 
     Attributes
@@ -230,8 +230,6 @@ class PredictedPoint:
     accuracy : float or None
         Of abs(Z), that was asked for [-].
     """
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
     design: str
     reason: str = ""
@@ -336,13 +334,8 @@ class Loaded(Displayed):
         """Ranges of R and X, how much they change, corners at the last frequency, and the judgement of a reading."""
         _, force, at = self.axes
         yield from self._ranges()
-        if len(force) > 1 or len(at) > 1:
-            yield ""
-            yield self._changes()
-        yield ""
-        yield self._corners()
-        yield ""
-        yield from self.prediction.judgement()
+        changes = [self._changes()] if len(force) > 1 or len(at) > 1 else ()
+        yield from apart(changes, [self._corners()], self.prediction.judgement())
 
     def _ranges(self) -> Iterator[Part]:
         """For which presses, and ranges of R and X."""
@@ -429,11 +422,9 @@ class LoadedOverview(Loaded):
     def document(self) -> Iterator[Part]:
         """Ranges of R and X, corners at the last frequency, and the verdict on a press."""
         yield from self._ranges()
-        yield ""
-        yield self._corners()
-        yield ""
         known = self.prediction.identifiability
-        yield f"{known.verdict}." if known else f"no load: {self.prediction.reason}"
+        verdict = f"{known.verdict}." if known else f"no load: {self.prediction.reason}"
+        yield from apart([self._corners()], [verdict])
         yield "(--details: changes of R and X, what would improve the sensor, error budget)"
 
 

@@ -3,7 +3,6 @@
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -14,6 +13,7 @@ from sensorgen.asprinted import printed as asprinted
 from sensorgen.checks.review import GCODE
 from sensorgen.checks.volumes import LayerVolume
 from sensorgen.core.findings import Finding
+from sensorgen.core.records import adapter
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
 from sensorgen.design.walls import TITLES
@@ -21,8 +21,6 @@ from sensorgen.export.gcode.results import Checked, Lifting
 from sensorgen.export.slicers import TIME_LIMIT_S
 
 if TYPE_CHECKING:
-    from pydantic import TypeAdapter
-
     from sensorgen.export.gcode.crossings import Lifted
 
 
@@ -116,7 +114,7 @@ class NewSlice:
 
     def record(self) -> dict[str, Any]:
         """The report as plain data."""
-        record: dict[str, Any] = adapter().dump_python(self.report, mode="json")
+        record: dict[str, Any] = adapter(SliceReport).dump_python(self.report, mode="json")
         return record
 
 
@@ -158,14 +156,6 @@ def slice_now(
         printed=Volumes(tuple(printed.rows), (*made.findings, *findings)), lifting=made.lifted.lifting,
     )  # fmt: skip
     return NewSlice(report, content, printed, made.lifted)
-
-
-@cache
-def adapter() -> "TypeAdapter[SliceReport]":
-    """The report as plain data, and back."""
-    from pydantic import TypeAdapter
-
-    return TypeAdapter(SliceReport)
 
 
 SHORT, IDLE = "1-short", "10-waiver"

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from sensorgen.core import cache as stored
 from sensorgen.core.errors import SensorgenError, UnknownName
+from sensorgen.core.records import adapter
 from sensorgen.design.design import Design
 from sensorgen.design.printer import folder as profiles
 from sensorgen.design.walls import PROGRAMS, SLICERS
@@ -43,9 +44,10 @@ class PrintFile:
     @cached_property
     def report(self) -> "SliceReport":
         """The report about the file."""
-        from sensorgen.prediction.new_slice import adapter
+        from sensorgen.prediction.new_slice import SliceReport
 
-        return adapter().validate_python(self.record)
+        report: SliceReport = adapter(SliceReport).validate_python(self.record)
+        return report
 
     @property
     def source(self) -> str:
@@ -172,14 +174,15 @@ def in_folder(design: Design, folder: Path | None = None) -> PrintFile | None:
     folder = folder or OUT / design.name
     if not (os.path.isdir(folder) and any(folder.glob("*.gcode.json"))):  # noqa: PTH112 - a name too long
         return None
-    from sensorgen.prediction.new_slice import adapter
+    from sensorgen.prediction.new_slice import SliceReport
 
+    known = adapter(SliceReport)
     for note in sorted(folder.glob("*.gcode.json")):
         try:
             content = note.with_suffix("").read_bytes()
-            report = adapter().validate_json(note.read_bytes())
+            report = known.validate_json(note.read_bytes())
             if report.design == design.id() and report.sha256 == sha256(content).hexdigest():
-                return PrintFile(adapter().dump_python(report, mode="json"), content, note.with_suffix("").name)
+                return PrintFile(known.dump_python(report, mode="json"), content, note.with_suffix("").name)
         except (OSError, ValueError):  # no file of ours
             continue
     return None

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cache, partial
 from itertools import product
 from math import inf, isfinite, isnan, nan, pi, prod, tan
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -18,9 +19,10 @@ from sensorgen.design.design import Design
 from sensorgen.design.effects import Effects
 from sensorgen.design.tip import WORDS
 from sensorgen.design.values import ASSUMED, ENDS, MaterialValue, assumed, lead_ranges
-from sensorgen.models import line
+from sensorgen.models import line, refusal
 from sensorgen.models.compression import Compression
 from sensorgen.models.sensor import Sensor
+from sensorgen.prediction import rest_state as resting
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.compression_law import CLOSED_FORM, at_a_few_pressures
 from sensorgen.prediction.error_budget import error_budget, material_ends, modulus_range
@@ -29,17 +31,6 @@ from sensorgen.prediction.identifiability.identify import identify
 from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.query import FORCE_N, Load, Query
 from sensorgen.prediction.reference_load import ReferenceLoad
-from sensorgen.prediction.rest_state import (
-    LARGEST_TANGENT,
-    LOWEST_HZ,
-    Added,
-    Lost,
-    RestState,
-    added,
-    electrode_resistance,
-    lost,
-    rest_state,
-)
 from sensorgen.prediction.results import SCHEMA, Impedance, Narrowing, Prediction, UnderTop
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece, sensor_model
 from sensorgen.scene.slabs import is_open
@@ -121,12 +112,12 @@ def prediction(body: Body, query: Query) -> Prediction:
     try:
         result = replace(result, gap=_gap(body))
         model, plan, reason = _model(body, query)
-        rest = model.rest if model else rest_state(body)
+        rest = model.rest if model else resting.rest_state(body)
         result = _at_rest(replace(result, status="predicted", reason=reason), body, rest, query.frequency_hz)
     except SensorgenError as error:  # no model applies, a value is missing, an electrode or a tool path is interrupted
         touches = result.gap is not None and result.gap.value == 0
         with suppress(SensorgenError):  # as a resistivity that is missing
-            result = replace(result, resistance=electrode_resistance(body))
+            result = replace(result, resistance=resting.electrode_resistance(body))
         return replace(result, status="short" if touches else "not predicted", reason=str(error))
     values, doubts = (model.values, model.doubts) if model else (rest.values, rest.doubts)
     result = replace(result, plan=plan, values=values, assumptions=tuple(_assumptions(body, model)), doubts=doubts)
@@ -155,13 +146,18 @@ def _gap(body: Body) -> Bounds | None:
     return Bounds.of(gaps[0], "m", print=by_print, certified=True)
 
 
-def _at_rest(result: Prediction, body: Body, rest: RestState, frequency_hz: tuple[float, ...]) -> Prediction:
+def _at_rest(result: Prediction, body: Body, rest: resting.RestState, frequency_hz: tuple[float, ...]) -> Prediction:
     """Capacitance, resistance, corner frequency and impedance without a load."""
-    r_only, c_only, gone, (farad, ohm) = rest.resistance, rest.capacitance, lost(body.design), added(body)
+    r_only, c_only, gone, (farad, ohm) = (
+        rest.resistance,
+        rest.capacitance,
+        resting.lost(body.design),
+        resting.added(body),
+    )
     resistance, c = {end: r.plus(*ohm) for end, r in r_only.items()}, c_only.plus(*farad)
     if set(resistance) != set(ENDS):
         return replace(result, capacitance=c, resistance=resistance)
-    r = _in_series(r_only["top"], r_only["bottom"])
+    r = _of_line(r_only["top"], r_only["bottom"], add, "ohm")
     corner = _of_line(r, c_only, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
     return replace(
         result, capacitance=c, resistance=resistance, corner_frequency=corner,
@@ -172,13 +168,13 @@ def _at_rest(result: Prediction, body: Body, rest: RestState, frequency_hz: tupl
     )  # fmt: skip
 
 
-def impedance_at(prediction: Prediction, frequency_hz: float, gone: Lost) -> Impedance | None:
+def impedance_at(prediction: Prediction, frequency_hz: float, gone: resting.Lost) -> Impedance | None:
     """Impedance at rest of a predicted sensor at any frequency; None where it is no line of two electrodes."""
     if prediction.capacitance is None or set(prediction.resistance) != set(ENDS):
         return None
     c, ends = prediction.capacitance, [prediction.resistance[end] for end in ENDS]
     leads = _beyond(c), _beyond(ends[0])
-    whole = _in_series(ends[0].alone(), ends[1].alone())
+    whole = _of_line(ends[0].alone(), ends[1].alone(), add, "ohm")
     return _impedance(frequency_hz, whole, c.alone(), gone, leads, Effects().permittivity_dispersion)
 
 
@@ -191,25 +187,14 @@ def parallel_range_f(prediction: Prediction, frequency_hz: float) -> Interval:
     return Interval(min(values), max(values))
 
 
-def _beyond(quantity: Bounds) -> Added:
+def _beyond(quantity: Bounds) -> resting.Added:
     """Least and most that leads may add to the value of a quantity."""
     ends = quantity.leads or Interval(quantity.value, quantity.value)
-    return Added(0.0, ends.lower - quantity.value, ends.upper - quantity.value)
-
-
-def _in_series(one: Bounds, other: Bounds) -> Bounds:
-    def added(a: Interval, b: Interval) -> Interval:
-        return Interval(a.lower + b.lower, a.upper + b.upper)
-
-    return Bounds(
-        one.value + other.value, one.lower + other.lower, one.upper + other.upper, "ohm",
-        added(one.model, other.model), added(one.print, other.print), added(one.material, other.material),
-        one.certified and other.certified,
-    )  # fmt: skip
+    return resting.Added(0.0, ends.lower - quantity.value, ends.upper - quantity.value)
 
 
 def _of_line(r: Bounds, c: Bounds, of: Callable[[float, float], float], unit: str) -> Bounds:
-    """A quantity of the unloaded line: at the ends of what resistance and capacitance may be."""
+    """A quantity of the unloaded line: at the ends of what two others, as resistance and capacitance, may be."""
 
     def ends(ohm: Interval, farad: Interval) -> Interval:
         values = [of(*pair) for pair in product((ohm.lower, ohm.upper), (farad.lower, farad.upper))]
@@ -223,7 +208,8 @@ def _of_line(r: Bounds, c: Bounds, of: Callable[[float, float], float], unit: st
 
 
 def _impedance(
-    frequency_hz: float, r: Bounds, c: Bounds, gone: Lost, leads: tuple[Added, Added], dispersion: float = 0.0
+    frequency_hz: float, r: Bounds, c: Bounds, gone: resting.Lost, leads: tuple[resting.Added, resting.Added],
+    dispersion: float = 0.0,
 ) -> Impedance:  # fmt: skip
     """Of the unloaded line at one frequency, at the end of its leads; r and c of the whole sensor.
 
@@ -235,7 +221,7 @@ def _impedance(
     @cache  # the same line at the end of other leads
     def own(ohm: float, farad: float, n: float, tangent: float) -> complex:
         lossy = 1j + tangent + tan(n * pi / 2)
-        admittance = omega * farad * (frequency_hz / LOWEST_HZ) ** -n * lossy + gone.leak_s
+        admittance = omega * farad * (frequency_hz / resting.LOWEST_HZ) ** -n * lossy + gone.leak_s
         return complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
 
     def z(
@@ -254,8 +240,8 @@ def _impedance(
     def part(name: str) -> Bounds:
         known = _of_line(r, c, lambda ohm, farad: float(getattr(z(ohm, farad), name)), "ohm")
         over, by = ([float(getattr(one, name)) for one in many] for many in (ends, alone))
-        lost = [float(getattr(z(r.value, c.value, n=n, tangent=tangent), name)) for n, tangent in losses]
-        material = Interval(min(known.material.lower, *lost), max(known.material.upper, *lost))
+        lossy = [float(getattr(z(r.value, c.value, n=n, tangent=tangent), name)) for n, tangent in losses]
+        material = Interval(min(known.material.lower, *lossy), max(known.material.upper, *lossy))
         low, high = min(known.lower, *over), max(known.upper, *over)
         return replace(known, lower=low, upper=high, material=material, leads=Interval(min(by), max(by)))
 
@@ -313,27 +299,22 @@ def _free_sides(body: Body) -> str:
 def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:
     """Sensors by the ways to print it that have the least and the largest capacitance; None where one is not known."""
     body = model.body
-    own = model.sensor.capacitance_f()
-    at_rest: list[tuple[float, Body, RestState]] = [(own, body, model.rest)]
+    at_rest: list[tuple[float, Body, resting.RestState]] = [(model.sensor.capacitance_f(), body, model.rest)]
     for rule in list(body.cells.scenes)[1:]:
         with suppress(SensorgenError):  # as of a short, which the prediction tells by itself
             other = body.printed_otherwise(rule)
-            rest = rest_state(other, ranges=False)
+            rest = resting.rest_state(other, ranges=False)
             at_rest.append((rest.capacitance.value, other, rest))
-    ends = {id(pick[1]): pick for pick in (_end(at_rest, least=True), _end(at_rest, least=False))}
-    pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
-    for _, other, rest in ends.values():
-        if other is not body:
-            tip = query.tip_of(body.design)
-            law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _closed_form(model), tip=tip)
-            yield build_sensor(other, law, tip, rest=rest).sensor if law else None
+    ends: dict[int, tuple[Body, resting.RestState]] = {}
+    for end in (min, max):
+        value = end(c for c, *_ in at_rest)
+        ends |= next({id(other): (other, rest)} for c, other, rest in at_rest if abs(c / value - 1) < _SAME)
+    yield from (_pressed(*pick, model, load, query) for pick in ends.values() if pick[0] is not body)
 
 
 def _other_films(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:
     """Sensors with the thickest and the thinnest film, and one a layer thinner; None where it is not known so."""
-    body, rest, tip = model.body, model.rest, query.tip_of(model.body.design)
-    film = body.cells.film
-    pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
+    body, rest, film = model.body, model.rest, model.body.cells.film
     films = ((film.thicker, rest.by_film.lower), (film.thinner, rest.by_film.upper),
              (film.layer_thinner, rest.layer_thinner_f)) if film else ()  # fmt: skip
     for scene, farad in films:
@@ -342,20 +323,17 @@ def _other_films(model: SensorModel, load: Load, query: Query) -> Iterator[Senso
             continue
         cells = replace(body.cells, scenes={"film": scene}, film=None)
         other = replace(body, make=lambda cells=cells: cells)  # type: ignore[misc]
-        law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _closed_form(model), tip=tip)
         at_rest = replace(rest, capacitance=replace(rest.capacitance, value=farad))
-        yield build_sensor(other, law, tip, rest=at_rest).sensor if law else None
+        yield _pressed(other, at_rest, model, load, query)
 
 
-def _closed_form(model: SensorModel) -> str:
-    """The law in closed form that was taken, or ""."""
-    return name if (name := model.law.compression.name) in CLOSED_FORM else ""
-
-
-def _end(candidates: list[tuple[float, Body, RestState]], *, least: bool) -> tuple[float, Body, RestState]:
-    """The first with the least or the largest capacitance, to 5 %."""
-    value = (min if least else max)(c for c, _, _ in candidates)
-    return next(pick for pick in candidates if abs(pick[0] / value - 1) < _SAME)
+def _pressed(other: Body, rest: resting.RestState, model: SensorModel, load: Load, query: Query) -> Sensor | None:
+    """Another body's sensor, its law at a few pressures or in the model's closed form; None where it is not known."""
+    tip, name = query.tip_of(other.design), model.law.compression.name
+    pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
+    closed_form = name * (name in CLOSED_FORM)
+    law = at_a_few_pressures(other.design, piece(other), rest.answer, pressure_pa, closed_form, tip=tip)
+    return build_sensor(other, law, tip, rest=rest).sensor if law else None
 
 
 def _with_tops(result: Prediction, model: SensorModel, load: Load, query: Query) -> Prediction:
@@ -414,7 +392,7 @@ def _sensitivity(model: SensorModel, load: Load, query: Query, others: Otherwise
     return Bounds.of(
         value, "1/kPa", model=_span(value, of, model.law.others), material=_span(value, of, moduli),
         print=_compounded(value, by_print),
-        open="upper" if any(_is_beyond(of, law) for law in moduli) else "",
+        open="upper" if any(refusal(OutOfRange, of, law) for law in moduli) else "",
     )  # fmt: skip
 
 
@@ -430,15 +408,6 @@ def _mean_slope(law: Compression, range_pa: tuple[float, float]) -> float:
     return float(((1 - low) / (1 - high) - 1) / (range_pa[1] - range_pa[0]) * _PA_PER_KPA)
 
 
-def _is_beyond(of: Callable[[Compression], float], law: Compression) -> bool:
-    """Test whether the pressure is more than a law, of softer material, is known for."""
-    try:
-        of(law)
-    except OutOfRange:
-        return True
-    return False
-
-
 def _resolution(result: Prediction, model: SensorModel, load: Load, query: Query, others: Otherwise) -> Prediction:
     """Standard errors of force and position from one reading, with what they are of sensors within the errors."""
     errors = partial(_errors, load=load, query=query)
@@ -446,7 +415,7 @@ def _resolution(result: Prediction, model: SensorModel, load: Load, query: Query
     by_law = [errors(replace(model.sensor, compression=other)) for other in law.others] if law.bounded else [(nan, nan)]
     by_print = [[errors(sensor) for sensor in sensors] for sensors in others]
     values = list(material_ends(model, ReferenceLoad(model.sensor, load)))
-    by_value = [[errors(sensor) for sensor in ends.sensors] for ends in values]
+    by_value = [[errors(sensor) for sensor in ends.sensors or ()] for ends in values]
 
     def of(which: int, unit: str) -> tuple[Bounds | None, dict[str, Interval]]:
         value = own[which]
@@ -496,11 +465,7 @@ def _range(values: Sequence[float]) -> Interval:
 
 def _span(value: float, of: Callable[[Compression], float], laws: Iterable[Compression]) -> Interval:
     """Lowest and highest over other laws of compression, those left out that the pressure is beyond."""
-    values = [value]
-    for law in laws:
-        with suppress(OutOfRange):
-            values.append(of(law))
-    return Interval(min(values), max(values))
+    return _range([value, *(of(law) for law in laws if refusal(OutOfRange, of, law) is None)])
 
 
 def _moduli(model: SensorModel) -> list[Compression]:
@@ -542,9 +507,9 @@ def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
     yield from _ranges_assumed(body.design, model.values if model else ())
     if not body.is_drawn:
         yield "contacts between extruded lines cost no resistance: no source gives their resistivity"
-    gone = lost(body.design)
+    gone = resting.lost(body.design)
     given = " and ".join(f"{t.quantity} of {t.material}" for t in gone.taken)
-    unknown = f"a loss tangent of up to {LARGEST_TANGENT:g} in the range of Z alone: no source gives it"
+    unknown = f"a loss tangent of up to {resting.LARGEST_TANGENT:g} in the range of Z alone: no source gives it"
     if not gone.taken:
         yield f"no leak, and {unknown}"
     else:

@@ -58,6 +58,24 @@ class Dispersed(Sensor):
         )  # fmt: skip
 
 
+class Assumption(NamedTuple):
+    """Basis of a term of the error budget; the first three, ``source`` and ``at_least`` as of the term.
+
+    ``sensors`` are those at the ends of its range, None where they are not known, and ``turns`` what it leads to beside
+    their changes; ``factor`` and ``since_rest`` as of :meth:`ReferenceLoad.change`.
+    """
+
+    name: str
+    what: str
+    kind: Any
+    sensors: Sequence[Sensor] | None
+    source: str = SOURCES
+    at_least: bool = False
+    since_rest: bool = False
+    turns: str = ""
+    factor: float = 1.0
+
+
 class ReferenceLoad:
     """The response to a load, to which responses of other sensors are compared.
 
@@ -89,14 +107,12 @@ class ReferenceLoad:
         """Highest pressure under the tip [Pa]."""
         return float(np.max(self.sensor.stress_pa(*self.at)))
 
-    def term(
-        self, name: str, what: str, kind: Any, others: Sequence[Sensor], *, factor: float = 1.0,
-        since_rest: bool = False, at_least: bool = False, source: str = SOURCES, turns: str = "",
-    ) -> Term:  # fmt: skip
-        """An assumption by the sensors at the ends of its range; parameters as :meth:`change` and of the term."""
-        changes = self.change(*others, factor=factor, since_rest=since_rest)
-        turned = ", ".join(filter(None, (turns, self.turns(changes, others))))
-        return Term(name, what, kind, changes, at_least, source, turned)
+    def term(self, of: Assumption) -> Term:
+        """An assumption by what it changes."""
+        others = of.sensors or ()
+        changes = None if of.sensors is None else self.change(*others, factor=of.factor, since_rest=of.since_rest)
+        turned = ", ".join(filter(None, (of.turns, self.turns(changes, others))))
+        return Term(of.name, of.what, of.kind, changes, of.at_least, of.source, turned)
 
     def change(self, *others: Sensor, factor: float = 1.0, since_rest: bool = False) -> Changes | None:
         """Largest changes over some other sensors, times a factor; None where one of them cannot take the load.

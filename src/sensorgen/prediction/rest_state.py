@@ -8,25 +8,17 @@ from typing import NamedTuple
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.design import values as stated
 from sensorgen.design.body import Body, Cells
 from sensorgen.design.design import Design
 from sensorgen.design.materials import FILM_LEAK, SET
-from sensorgen.design.values import (
-    ASSUMED,
-    ENDS,
-    MaterialValue,
-    dielectrics,
-    lead_ranges,
-    permittivities,
-    resistivities,
-    spread,
-)
+from sensorgen.design.values import MaterialValue
 from sensorgen.prediction.capacitance import PLANE, Answer, Unpredictable, capacitance, default_width, of_sensor
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.slabs import is_open
 
 
-def electrode_resistance(body: Body, ends: Sequence[str] = ENDS) -> dict[str, Bounds]:
+def electrode_resistance(body: Body, ends: Sequence[str] = stated.ENDS) -> dict[str, Bounds]:
     """Resistance of the top and the bottom electrode from end to end [ohm].
 
     Parameters
@@ -44,7 +36,7 @@ def electrode_resistance(body: Body, ends: Sequence[str] = ENDS) -> dict[str, Bo
         An electrode that does not reach from end to end.
     """
     design, resistance = body.design, {}
-    for end, rho in ((end, rho) for end, rho in resistivities(design).items() if end in ends):
+    for end, rho in ((end, rho) for end, rho in stated.resistivities(design).items() if end in ends):
         scene, *others = dict.fromkeys(body.cells.scenes.values())
         solid = _of_cell(body, scene, end, rho.value)
         printed = [solid.middle()]
@@ -53,7 +45,7 @@ def electrode_resistance(body: Body, ends: Sequence[str] = ENDS) -> dict[str, Bo
                 printed.append(_of_cell(body, other, end, rho.value).middle())
             except OutOfRange:  # by this rule the electrode is interrupted
                 printed.append(float("inf"))
-        value, (low, high) = solid.middle(), spread(design, rho)
+        value, (low, high) = solid.middle(), stated.spread(design, rho)
         relative = Interval(low / rho.value, high / rho.value) if rho.value else Interval(1.0, 1.0)
         resistance[end] = Bounds.of(
             value, "ohm", model=solid, print=Interval(min(printed), max(printed)), certified=True,
@@ -85,7 +77,7 @@ def set_losses(design: Design) -> list[MaterialValue]:
     No source gives a loss tangent, and the one resistivity that a source prints is a slip: what the user does not set
     is taken for lossless; only the range of an impedance holds up to ``LARGEST_TANGENT``.
     """
-    names = dielectrics(design) | {"air"}
+    names = stated.dielectrics(design) | {"air"}
     return [
         MaterialValue(name, quantity, values[quantity], SET)
         for name, values in sorted(design.material_values.items())
@@ -114,7 +106,7 @@ def permittivity(design: Design, frequency_hz: float | None = None) -> tuple[dic
     MissingValue
         A dielectric without a permittivity.
     """
-    taken = permittivities(design)
+    taken = stated.permittivities(design)
     eps = _with(taken, set_losses(design), frequency_hz)
     return eps, [*taken, *set_losses(design)]
 
@@ -181,7 +173,7 @@ def lost(design: Design) -> Lost:
     Unpredictable
         No model knows the losses of this scene.
     """
-    taken, sets = permittivities(design), set_losses(design)
+    taken, sets = stated.permittivities(design), set_losses(design)
     parts = {quantity: [t for t in sets if t.quantity == quantity] for quantity in LOSSES}
     tangents, leaks = (_tangent(design, taken, parts[quantity]) for quantity in LOSSES)
     film = _film_leak(design)
@@ -195,7 +187,7 @@ def _largest(design: Design, taken: Sequence[MaterialValue], given: Sequence[Mat
     """Largest C''/C' [-]: as given, and ``LARGEST_TANGENT`` for each dielectric but air of which none is."""
     known = {value.material for value in given} | {"air"}
     assumed = [
-        MaterialValue(name, LOSSES[0], LARGEST_TANGENT, ASSUMED)
+        MaterialValue(name, LOSSES[0], LARGEST_TANGENT, stated.ASSUMED)
         for name in dict.fromkeys(value.material for value in taken) if name not in known
     ]  # fmt: skip
     if not given or known == {"air"}:
@@ -294,7 +286,7 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
     MissingValue
         No source gives a material value that is needed.
     """
-    values, rho = permittivities(body.design), resistivities(body.design)
+    values, rho = stated.permittivities(body.design), stated.resistivities(body.design)
     eps = {v.material: v.value for v in values}
     cells = body.cells
     scene = cells.first()
@@ -344,7 +336,7 @@ def _other_prints(cells: Cells, eps: Mapping[str, float], width: float) -> tuple
 def _resistance(body: Body) -> tuple[dict[str, Bounds], list[str]]:
     """Of the electrodes that reach from end to end, and why another has none."""
     resistance, reasons = dict[str, Bounds](), list[str]()
-    for end in ENDS:
+    for end in stated.ENDS:
         try:
             resistance |= electrode_resistance(body, (end,))
         except OutOfRange as error:
@@ -383,12 +375,12 @@ def _permittivity_range(design: Design, scene: Scene, middle: float) -> Interval
 
 def permittivity_ratios(design: Design, scene: Scene) -> dict[str, tuple[float, float]]:
     """Capacitance over that with the permittivity taken, at the lowest and the highest value of each material [-]."""
-    values = permittivities(design)
+    values = stated.permittivities(design)
     eps = {v.material: v.value for v in values}
     usual = capacitance(scene, eps).capacitance_f.middle()
     ratios = {}
     for value in values:
-        low, high = spread(design, value)
+        low, high = stated.spread(design, value)
         if high > _TOLD_APART * low:
             ends = (
                 capacitance(scene, eps | {value.material: end}).capacitance_f.middle() / usual for end in (low, high)
@@ -415,11 +407,11 @@ def added(body: Body) -> tuple[Added, Added]:
     """
     from sensorgen.models.overlap import edge_fringe_f
 
-    farad, ohm = (Added(*of) for of in lead_ranges(body.design))
+    farad, ohm = (Added(*of) for of in stated.lead_ranges(body.design))
     p, gap_mm = body.design.params, next(iter(body.cells.gap_mm.values()), 0.0)
     if is_open(body.cells.first()) or not 0 < gap_mm < p.width_mm:
         return farad, ohm  # electrodes whose fringe is in the capacitance already
-    eps = max(value.value for value in permittivities(body.design))
+    eps = max(value.value for value in stated.permittivities(body.design))
     around, gap, across, high = (
         s * M_PER_MM for s in (2 * (p.length_mm + p.width_mm), gap_mm, p.width_mm, p.electrode_mm)
     )

@@ -3,31 +3,19 @@
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, field, replace
-from functools import cache
 from math import inf, nan
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, Literal
 
 from sensorgen.core.bounds import Bounds, Interval
-from sensorgen.core.display import Displayed
+from sensorgen.core.display import Boundless, Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
+from sensorgen.core.records import adapter
 from sensorgen.core.units import si
 from sensorgen.design.values import ASSUMED, ENDS, MaterialValue
-from sensorgen.prediction.identifiability.results import (
-    CANNOT_LOCATE,
-    CANNOT_SENSE,
-    GUESS,
-    Identifiability,
-    StandardErrors,
-    metres,
-    newtons,
-    of_schema_1,
-)  # fmt: skip
+from sensorgen.prediction.identifiability import results as identified
 from sensorgen.prediction.plan import Plan, without_times
-
-if TYPE_CHECKING:
-    from pydantic import TypeAdapter
 
 _SHORT = 60  # characters that say what an assumption is, on a first screen
 _LEAST_PERCENT = 0.005  # change of a value that is not rounding
@@ -112,7 +100,9 @@ class Term:
     def wrong(self) -> list[str]:
         """Force and position by which a press is read wrongly, where these are more than nothing."""
         c = self.changes or Changes()
-        return [newtons(c.force_n)] * (c.force_n > _LEAST_N) + [metres(c.position_m)] * (c.position_m > _LEAST_M)
+        return [identified.newtons(c.force_n)] * (c.force_n > _LEAST_N) + [identified.metres(c.position_m)] * (
+            c.position_m > _LEAST_M
+        )
 
     def at_rest(self) -> str:
         """Changes of C and R in per cent, from a thousandth on."""
@@ -290,12 +280,12 @@ class UnderTop:
     force_resolution: Bounds | None = None
     position_resolution: Bounds | None = None
     sensitivity: Bounds | None = None
-    calibrated: StandardErrors | None = None
-    typical: StandardErrors | None = None
+    calibrated: identified.StandardErrors | None = None
+    typical: identified.StandardErrors | None = None
 
     def bench(self) -> tuple[Bounds | None, Bounds | None]:
         """Standard errors of force and position after known presses [N], [m]."""
-        known = self.calibrated or StandardErrors(sigma_force_n=None, sigma_position_m=None)
+        known = self.calibrated or identified.StandardErrors(sigma_force_n=None, sigma_position_m=None)
         return (
             on_bench(self.force_resolution, known.sigma_force_n),
             on_bench(self.position_resolution, known.sigma_position_m),
@@ -304,13 +294,15 @@ class UnderTop:
     def words(self, most_n: float = inf, length_m: float = inf) -> str:
         """Name, standard errors after known presses; what cannot be done up to a force [N] and over a length [m]."""
         force, position = self.bench()
-        known = ((force, "N", most_n, CANNOT_SENSE), (position, "m", length_m, CANNOT_LOCATE))
-        words = [si(b.value, u, 3) if b.value < GUESS * abs(most) else cannot for b, u, most, cannot in known if b]
+        known = ((force, "N", most_n, identified.CANNOT_SENSE), (position, "m", length_m, identified.CANNOT_LOCATE))
+        words = [
+            si(b.value, u, 3) if b.value < identified.GUESS * abs(most) else cannot for b, u, most, cannot in known if b
+        ]
         return f"{self.name} {', '.join(words)}"
 
 
 @dataclass(frozen=True)
-class Prediction(Displayed):
+class Prediction(Boundless, Displayed):
     """Prediction of a sensor's readings.
 
     Attributes
@@ -363,8 +355,6 @@ class Prediction(Displayed):
         What narrows ranges that span a factor above 3.
     """
 
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
-
     schema: int
     design: str
     design_id: str
@@ -382,7 +372,7 @@ class Prediction(Displayed):
     force_resolution: Bounds | None = None
     position_resolution: Bounds | None = None
     tops: tuple[UnderTop, ...] = ()
-    identifiability: Identifiability | None = None
+    identifiability: identified.Identifiability | None = None
     budget: ErrorBudget | None = None
     plan: Plan | None = None
     values: tuple[MaterialValue, ...] = ()
@@ -417,8 +407,8 @@ class Prediction(Displayed):
         (force, position), known = self.bench(), self.identifiability
         length_m = max(known.map.position_m, default=inf) if known else inf
         return (
-            resolved(force, self.force_n, CANNOT_SENSE, conditional=self.conditional),
-            resolved(position, length_m, CANNOT_LOCATE, conditional=self.conditional),
+            resolved(force, self.force_n, identified.CANNOT_SENSE, conditional=self.conditional),
+            resolved(position, length_m, identified.CANNOT_LOCATE, conditional=self.conditional),
         )
 
     def rests_on(self, verdict: str = "") -> tuple[str, ...]:
@@ -618,9 +608,9 @@ def resolved(error: Bounds | None, most: float, cannot: str, *, conditional: boo
     """
     if error is None:
         return "–"
-    if not (error.lower if conditional else error.value) < GUESS * most:
+    if not (error.lower if conditional else error.value) < identified.GUESS * most:
         return cannot
-    if not error.value < GUESS * most:
+    if not error.value < identified.GUESS * most:
         return f"{cannot}, at best {si(error.lower, error.unit, 2)}"
     if error.upper > most:
         error = replace(error, upper=most, open="upper")
@@ -650,17 +640,9 @@ def _change(part: Interval, value: float) -> str:
     return " to ".join(f"{float(f'{c:.2g}'):+g}" if abs(c) >= _LEAST_PERCENT else "0" for c in changes) + " %"
 
 
-@cache
-def adapter() -> "TypeAdapter[Prediction]":
-    """Conversion of a prediction to JSON and back, and its schema."""
-    from pydantic import TypeAdapter
-
-    return TypeAdapter(Prediction)
-
-
 def to_json(prediction: Prediction) -> str:
     """A prediction as JSON, the same for the same prediction: without run times; infinities are "Infinity"."""
-    return adapter().dump_json(timeless(prediction)).decode()
+    return adapter(Prediction).dump_json(timeless(prediction)).decode()
 
 
 def timeless(prediction: Prediction) -> Prediction:
@@ -681,11 +663,13 @@ def from_json(text: str) -> Prediction:
         data = json.loads(text)
         if isinstance(data, dict) and "schema" not in data:
             return _of_schema_1(data)
-        if isinstance(data, dict) and data["schema"] == 2:
-            return adapter().validate_python(_of_schema_2(data), strict=False)
-        if isinstance(data, dict) and data["schema"] not in (3, SCHEMA):
+        if isinstance(data, dict) and data["schema"] not in (2, 3, SCHEMA):
             raise BadInput(f"a prediction of schema {data['schema']}; this version reads {SCHEMA} and older: update")
-        return adapter().validate_json(text)
+        known, old = adapter(Prediction), isinstance(data, dict) and data["schema"] == 2
+        found: Prediction = (
+            known.validate_python(_of_schema_2(data), strict=False) if old else known.validate_json(text)
+        )
+        return found
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
         raise BadInput(f"not a prediction: {str(error).partition(chr(10))[0]:.200}") from None
 
@@ -712,8 +696,8 @@ def _of_schema_1(data: dict[str, Any]) -> Prediction:
         resistance={end: Bounds.of(ohm, "ohm") for end, ohm in data.get("electrode_resistance_ohm", {}).items()},
         corner_frequency=_old_bounds(data.get("corner_frequency_hz"), "Hz"),
         impedance=tuple(_old_impedance(tone) for tone in data.get("impedance_ohm", ())),
-        identifiability=of_schema_1(known), values=tuple(MaterialValue(**value) for value in data.get("values", ())),
-        assumptions=tuple(data.get("assumptions", ())),
+        identifiability=identified.of_schema_1(known), assumptions=tuple(data.get("assumptions", ())),
+        values=tuple(MaterialValue(**value) for value in data.get("values", ())),
     )  # fmt: skip
 
 

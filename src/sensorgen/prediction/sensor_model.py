@@ -250,7 +250,8 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
     sensor = rough.sensor
     line = _expected(_line(sensor, load, wanted / 3))
     share = (wanted - min(_reach(line), wanted / 3)) / 2
-    by_capacitance = _by_capacitance(sensor, load)
+    changes = ReferenceLoad(sensor, load).change(_scaled(sensor, 1 + _NUDGE))
+    by_capacitance = changes.magnitude / _NUDGE if changes else 1.0
     printed = None if body.is_drawn else piece(body)
 
     def laws(answer: Answer) -> list[LawOption]:
@@ -313,12 +314,6 @@ def execute(planned: PredictionPlan) -> tuple[SensorModel, Plan]:
 def _left(accuracy: float, level: Level) -> float:
     """Accuracy that the levels before left; where that is nothing, the planned one."""
     return accuracy if accuracy > 0 else level.allowed
-
-
-def _by_capacitance(sensor: Sensor, load: Load) -> float:
-    """Relative change of abs(Z) over that of the capacitance [-]."""
-    changes = ReferenceLoad(sensor, load).change(_scaled(sensor, 1 + _NUDGE))
-    return changes.magnitude / _NUDGE if changes else 1.0
 
 
 def _scaled(sensor: Sensor, factor: float) -> Sensor:

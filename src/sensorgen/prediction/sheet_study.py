@@ -12,18 +12,10 @@ from sensorgen.core.document import Cell, Column, Facts, Part, Table, to_json
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM, si
 from sensorgen.models.sensor import Sensor
-from sensorgen.models.sheet import (
-    Contact,
-    Port,
-    PressErrors,
-    Sheet,
-    SheetPatch,
-    contact_sets,
-    depth_m,
-    impedance,
-    localise,
-)
+from sensorgen.models.sheet import impedance, localise
 from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.solvers.sheet.parts import Contact, Port, Sheet, SheetPatch
+from sensorgen.solvers.sheet.solve import PressErrors, contact_sets, depth_m
 
 PLACES = 7  # along each side
 BOUNDLESS = 1e6  # N or m: a larger error has no meaning

@@ -75,15 +75,13 @@ def _stack(given: PressedLine) -> Complex:
 def _sheet(given: PressedLine, cells: int) -> Complex:
     """Two sheets with contacts all along one edge, pressed across their whole width."""
     from sensorgen.models import sheet
+    from sensorgen.solvers.sheet.parts import Sheet, SheetPatch
 
     p = vars(given)
-    resistances = (
-        p["top_resistivity_ohm_m"] / p["top_thickness_m"],
-        p["bottom_resistivity_ohm_m"] / p["bottom_thickness_m"],
-    )
-    plate = sheet.Sheet(p["length_m"], p["width_m"], resistances, EPS0_F_PER_M * p["eps_r"] / p["film_m"])
+    top, bottom = (p[f"{end}_resistivity_ohm_m"] / p[f"{end}_thickness_m"] for end in ("top", "bottom"))
+    plate = Sheet(p["length_m"], p["width_m"], (top, bottom), EPS0_F_PER_M * p["eps_r"] / p["film_m"])
     thinner = 1 / (1 - p["force_n"] / (p["width_m"] * p["tip_m"] * p["modulus_pa"]))
-    press = sheet.SheetPatch(p["left_m"], 0.0, p["tip_m"], p["width_m"], thinner)
+    press = SheetPatch(p["left_m"], 0.0, p["tip_m"], p["width_m"], thinner)
     contacts = plate.edge("top", "left"), plate.edge("bottom", "left")
     return sheet.impedance(plate, [contacts], p["frequency_hz"], press, cells)[:, 0, 0]
 

@@ -15,18 +15,9 @@ from sensorgen.design import best
 from sensorgen.design.design import Design
 from sensorgen.prediction.results import UNPREDICTED
 from sensorgen.workflows import moves
+from sensorgen.workflows import trial as trials
 from sensorgen.workflows.moves import Candidate, Nearest
-from sensorgen.workflows.trial import (
-    Advice,
-    Change,
-    Trial,
-    TriedChange,
-    effects,
-    finding_counts,
-    grade,
-    trial,
-    words_of,
-)
+from sensorgen.workflows.trial import Advice, Trial
 
 BUDGET_S = 60.0
 SHOWN = 3
@@ -136,7 +127,7 @@ class AdviceSearch(Nearest):
     def _predicted(self, one: Candidate) -> Trial:
         self.predicted += 1
         start_s = used_s()
-        tried = trial(moves.changed(self.base, one.values), drawn=False)
+        tried = trials.trial(moves.changed(self.base, one.values), drawn=False)
         self.longest_s = max(self.longest_s, used_s() - start_s)
         return tried
 
@@ -165,11 +156,11 @@ class AdviceSearch(Nearest):
         left, others = one.counts(), [kept for kept in self.nearest if not one.values.items() < kept.values.items()]
         alike = all(left < kept.counts() for kept in others if kept.values.keys() <= one.values.keys())
         is_least = len(others) < SHOWN or left < min(kept.counts() for kept in others)
-        return left[0] == 0 and left < finding_counts(self.now.findings) and alike and is_least
+        return left[0] == 0 and left < trials.finding_counts(self.now.findings) and alike and is_least
 
     def _is_good(self, tried: Trial) -> bool:
         """Test whether a print can sense what the design's can, with no further doubt."""
-        senses = all(min(old, 1) <= new for old, new in zip(grade(self.now), grade(tried), strict=True))
+        senses = all(min(old, 1) <= new for old, new in zip(trials.grade(self.now), trials.grade(tried), strict=True))
         is_worse = tried.status != "predicted" or tried.errors() or len(tried.doubts) > len(self.now.doubts)
         return senses and not is_worse
 
@@ -199,18 +190,20 @@ class AdviceSearch(Nearest):
         untried = [*self.untried, *(one for *_, one in self.heap if one.origin)]
         kept = [self._tried(one, one.trial) for one in (*self.kept, *self.nearest) if one.trial]
         return Advice(
-            tuple(sorted(kept, key=lambda one: (not one.better, one.distance, one.counts()))), words_of(self.now),
-            self.checked, self.predicted, round(self.budget_s - self.left_s, 2), self.budget_s, not self.heap,
-            min((order[0] for order, *_ in self.heap), default=FARTHEST), NOT_TRIED,
+            tuple(sorted(kept, key=lambda one: (not one.better, one.distance, one.counts()))),
+            trials.words_of(self.now), self.checked, self.predicted, round(self.budget_s - self.left_s, 2),
+            self.budget_s, not self.heap, min((order[0] for order, *_ in self.heap), default=FARTHEST), NOT_TRIED,
             tuple(f"{o.about}: {moves.words(one.values)} ({o.numbers})" for one in untried if (o := one.origin)),
         )  # fmt: skip
 
-    def _tried(self, one: Candidate, made: Trial) -> TriedChange:
+    def _tried(self, one: Candidate, made: Trial) -> trials.TriedChange:
         """A design that is kept, with its effects on what the sensor is for."""
-        changes = tuple(Change(".".join(key), moves.own(self.base, key), value) for key, value in one.values.items())
-        better, words = effects(self.now, made)
+        changes = tuple(
+            trials.Change(".".join(key), moves.own(self.base, key), value) for key, value in one.values.items()
+        )
+        better, words = trials.effects(self.now, made)
         about = one.origin.about if one.origin else ""
-        return TriedChange(changes, one.distance, made, about, better, words)
+        return trials.TriedChange(changes, one.distance, made, about, better, words)
 
 
 def _has_idle(whole: Candidate, part: Candidate) -> bool:

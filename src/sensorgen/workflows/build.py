@@ -8,13 +8,14 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from sensorgen.checks.review import Step, draw, report
 from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.cache import Unknown, only_known
-from sensorgen.core.document import Part
+from sensorgen.core.display import Boundless
+from sensorgen.core.document import Part, apart
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.findings import Finding, headline, listed, most_severe
 from sensorgen.core.version import __version__
@@ -40,7 +41,7 @@ STEPS = ("meshes", "checks", "validity", "prediction", "3MF", "profiles", "drawi
 
 
 @dataclass(frozen=True)
-class Built:
+class Built(Boundless):
     """Results of a build.
 
     Attributes
@@ -71,8 +72,6 @@ class Built:
         Effect of the compensation on the resolutions.
     """
 
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
-
     name: str
     folder: Path
     files: tuple[str, ...]
@@ -90,12 +89,8 @@ class Built:
         """Verdict, quantities drawn beside printed, and the three findings that matter most."""
         yield from self._head()
         yield from table(self.trial) if self.trial else self.prediction.summary()
-        if shown := most_severe(self.findings, 3):
-            yield ""
-            yield from listed(shown)
-        if self.advice:
-            yield ""
-            yield from self.advice.document()
+        advice = self.advice.document() if self.advice else ()
+        yield from apart(listed(most_severe(self.findings, 3)), advice)
         yield ""
         yield from self.written()
 

@@ -25,7 +25,6 @@ from sensorgen.scene.scene import Envelope, Fill, Scene
 
 _SMALL = {"length_mm": 12.0, "width_mm": 5.0}  # of a test's sensor, where the shape's ranges hold it
 _IMPORTS = ("sensorgen.scene", "sensorgen.core.errors")
-_NEEDED = {True: ("resistivity_ohm_m",), False: ("relative_permittivity", "youngs_modulus_pa", "poisson_ratio")}
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 Step = Callable[[str], None]
 
@@ -95,7 +94,13 @@ def _one(word: str) -> File:
 
 
 def _pack(word: str) -> Pack:
-    return packs.beside(Path(word)) if Path(word).is_dir() else _named(word)
+    """A pack by its folder or its name."""
+    if Path(word).is_dir():
+        return packs.beside(Path(word))
+    known = {pack.name: pack for pack in [*packs.installed(), *packs.own(), *packs.shipped()]}
+    if word not in known:
+        raise UnknownName("pack", word, known)
+    return known[word]
 
 
 def _files(pack: Pack) -> list[File]:
@@ -104,13 +109,6 @@ def _files(pack: Pack) -> list[File]:
 
 def _nothing(word: str) -> BadInput:
     return BadInput(f"{word}: no files of a pack; expected folders as {', '.join(packs.SINGULAR)}")
-
-
-def _named(word: str) -> Pack:
-    known = {pack.name: pack for pack in [*packs.installed(), *packs.own(), *packs.shipped()]}
-    if word not in known:
-        raise UnknownName("pack", word, known)
-    return known[word]
 
 
 def trust(word: str) -> list[str]:
@@ -215,7 +213,9 @@ def _misplaced(pack: Pack) -> Faults:
         if near and folder.is_dir() and folder.name not in packs.SINGULAR:
             yield f"{folder.name}/", "nothing reads this folder", f"rename it to {near}"
     if (pack.folder / packs.MANIFEST).exists():  # else a folder with designs, whose files are named by their paths
-        yield from _in_no_folder(pack)
+        for path in _listed(pack.folder, (".yaml", ".yml")):
+            if path.name != packs.MANIFEST and (own := _kind_of(path)):
+                yield path.name, f"nothing reads this {packs.SINGULAR[own]} here", f"move it to {own}"
 
 
 def _unread(pack: Pack) -> Faults:
@@ -225,13 +225,6 @@ def _unread(pack: Pack) -> Faults:
         for path in _listed(pack.place(kind), (".yaml", ".yml", ".py")):
             if path.name not in read:
                 yield f"{kind}/{path.name}", "nothing reads this file", _where_to(path, kind)
-
-
-def _in_no_folder(pack: Pack) -> Faults:
-    """Files beside the folders."""
-    for path in _listed(pack.folder, (".yaml", ".yml")):
-        if path.name != packs.MANIFEST and (kind := _kind_of(path)):
-            yield path.name, f"nothing reads this {packs.SINGULAR[kind]} here", f"move it to {kind}"
 
 
 def _listed(folder: Path, endings: str | tuple[str, ...] = "") -> list[Path]:
@@ -275,7 +268,11 @@ def _material(file: File) -> Faults:
             yield "quantity", str(UnknownName("quantity", quantity, known)), "take a name that sensorgen reads"
         yield from _default(quantity, values)
         for value in values:
-            yield from _material_value(quantity, value, cited)
+            if value.source not in cited:
+                where = "say under 'citations' where it is published"
+                yield "source", f"{quantity}: source {value.source!r} is not explained", where
+            if value.default and value.implausible:
+                yield "default", f"{quantity} of {value.source} is implausible and a default", "remove one of them"
     if not material.properties and not material.print:
         yield "values", "no values", "add at least one quantity"
 
@@ -285,15 +282,6 @@ def _default(quantity: str, values: Sequence[materials.Value]) -> Faults:
     usable = [value.source for value in values if not value.implausible and math.isfinite(value.value)]
     if usable and not any(value.default for value in values):
         yield "default", f"{quantity} has no default value", f"add 'default: true' to that of {usable[0]}"
-
-
-def _material_value(quantity: str, value: materials.Value, cited: set[str]) -> Faults:
-    """Faults of one value."""
-    if value.source not in cited:
-        where = "say under 'citations' where it is published"
-        yield "source", f"{quantity}: source {value.source!r} is not explained", where
-    if value.default and value.implausible:
-        yield "default", f"{quantity} of {value.source} is implausible and a default", "remove one of them"
 
 
 def _program(file: File, text: str) -> Faults:

@@ -6,12 +6,13 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from sensorgen.checks.review import STEPS as CHECKS
 from sensorgen.checks.review import CheckReport, Review, Step, report
 from sensorgen.core.cache import Unknown, only_known
-from sensorgen.core.document import Part
+from sensorgen.core.display import Boundless
+from sensorgen.core.document import Part, apart
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Refused, headline, listed
 from sensorgen.core.parallel import open_lanes, used_s
@@ -30,7 +31,7 @@ STEPS = ("prediction", "changes", "done")
 
 
 @dataclass(frozen=True)
-class Decision(CheckReport):
+class Decision(Boundless, CheckReport):
     """The findings about a print, and what follows from them.
 
     Attributes
@@ -43,8 +44,6 @@ class Decision(CheckReport):
         Changes that were tried; None where none was looked for.
     """
 
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
-
     trial: Trial | None = None
     reason: str = ""
     advice: Advice | None = None
@@ -52,14 +51,7 @@ class Decision(CheckReport):
     def document(self) -> Iterator[Part]:
         """Verdict, numbers, findings and changes."""
         yield headline(self.name, self.findings, self.source)
-        if self.trial or self.reason:
-            yield from ("", *self.numbers())
-        if self.findings:
-            yield ""
-            yield from listed(self.findings)
-        if self.advice:
-            yield ""
-            yield from self.advice.document()
+        yield from apart(self.numbers(), listed(self.findings), self.advice.document() if self.advice else ())
 
     def page(self, printed: "Printed", held: Review, predicted: "Prediction") -> str:
         """All that is known of the design as one page, HTML."""
@@ -77,19 +69,15 @@ class Decision(CheckReport):
 
 
 @dataclass(frozen=True)
-class RefusedBuild(Refused):
+class RefusedBuild(Boundless, Refused):
     """A design that is not built because of findings, with changes that were tried."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
     advice: Advice | None = None
 
     def document(self) -> Iterator[Part]:
         """Verdict, the findings that matter most, and changes."""
         yield from super().document()
-        if self.advice:
-            yield ""
-            yield from self.advice.document()
+        yield from apart(self.advice.document() if self.advice else ())
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from sensorgen.core import files as store
+from sensorgen.core import yamlfile
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.core.parallel import in_parallel
@@ -17,22 +18,9 @@ if TYPE_CHECKING:
 
 LOG = "lab.db"
 KNOWN, UNKNOWN = 30, 10  # presses that calibrate, and those that are found again
-_PLAN = """\
-# A column of {count} sensors of the same design.
-iteration: 1
-designs:
-  - {{shape: tri, parameters: {{dielectric_mm: 0.2}}, replicates: {count}}}
-layout: {{kind: column, spacing_mm: 5}}
-"""
-_EXPERIMENT = """\
-# A virtual specimen of the design, with material values from their ranges; it differs by its seed.
-specimen: {specimen}
-virtual: {{seed: {seed}}}
-tip: flat
-plan:
-  - random: {{presses: {presses}, seed: {plan}, force_n: [0.4, 6], hold_s: [0.3, 5], rest_s: 2}}
-remark: {remark}
-"""
+_PLAN, _EXPERIMENT = (
+    yamlfile.text(Path(__file__).parent / "virtual" / name) for name in ("column.txt", "experiment.txt")
+)
 
 
 @dataclass(frozen=True)

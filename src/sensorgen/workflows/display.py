@@ -1,5 +1,6 @@
 """Drawings, tables and figures of results, as a notebook shows them."""
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,25 +30,17 @@ def _(design: Design) -> str:
     return draw(design, reviewed(design))
 
 
-@display.figure.register(Review)
-def _(of: Review) -> "Figure":
+def _figure(name: str, of: Any) -> "Figure":
+    """Figure of a result by a function of the plots."""
     from sensorgen.analysis.plots import results, static
 
-    return static.whole(results.findings(of))
+    return static.whole(getattr(results, name)(of))
 
 
-@display.figure.register(Sweep)
-def _(of: Sweep[Any]) -> "Figure":
-    from sensorgen.analysis.plots import results, static
-
-    return static.whole(results.sweep(of))
-
-
-@display.figure.register(CompressionResult)
-def _(of: CompressionResult) -> "Figure":
-    from sensorgen.analysis.plots import results, static
-
-    return static.whole(results.compression_figure(of))
+for _kind, _name in (
+    (Review, "findings"), (Sweep, "sweep"), (CompressionResult, "compression_figure"), (Prediction, "ranges"),
+):  # fmt: skip
+    display.figure.register(_kind, partial(_figure, _name))
 
 
 @display.figure.register(Loaded)
@@ -57,10 +50,3 @@ def _(of: Loaded) -> "Figure":
     z = of.impedance
     axes = (np.asarray(z.force_n), np.asarray(z.position_mm))
     return static.whole(results.lines(z.frequency_hz, *axes, z.impedance_ohm, of.prediction.design))
-
-
-@display.figure.register(Prediction)
-def _(of: Prediction) -> "Figure":
-    from sensorgen.analysis.plots import results, static
-
-    return static.whole(results.ranges(of))

@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 
 from sensorgen.core import files as store
+from sensorgen.core import yamlfile
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Part, Table
 
@@ -23,12 +24,7 @@ _FINE = 5  # points along a side of a crossing's square, of the true load
 _STEP_DAY = 4.0  # two days after the last recording of the calibration
 _REST = 100  # frames without load at the begin of each recording
 _SCATTER, _PLAY, _CREEP, _DRIFT = 0.05, 0.02, 0.02, -0.002  # of the virtual print
-_DESIGN: Mapping[str, Any] = {
-    "shape": "array",
-    "border": "foot 42 left",
-    "parameters": {"pitch_x_mm": 10.0, "pitch_y_mm": 10.0, "column_mm": 8.15, "row_mm": 8.15},
-    "cell": {"shape": "porous", "parameters": {"dielectric_mm": 0.6, "space_mm": 0.35}},
-}  # fmt: skip
+_DESIGN: Mapping[str, Any] = yaml.safe_load(yamlfile.text(Path(__file__).parent / "virtual" / "insole.yaml"))
 # What may be changed: parameters of the array, of its cell, and why
 _Change = tuple[dict[str, Any], dict[str, Any], str]
 _CHANGES: tuple[_Change, ...] = (

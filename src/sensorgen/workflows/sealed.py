@@ -7,7 +7,7 @@ SHA-256 of its files and the identity of its design. Whoever rewrites a file and
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 SEAL = "sha256"  # key of a record's own hash
 STALE = ".stale"  # suffix of G-code of another design
+_WORDS = {"links": "link"}
 
 
 @dataclass(frozen=True)
@@ -45,18 +46,16 @@ class Differences:
     missing: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()
     extra: tuple[str, ...] = ()
-    links: tuple[str, ...] = field(default=())
+    links: tuple[str, ...] = ()
     record: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         """Test whether anything differs."""
-        return bool(self.missing or self.changed or self.extra or self.links or self.record)
+        return any(vars(self).values())
 
     def document(self) -> Iterator[Part]:
         """A line for each file that differs."""
-        yield from (f"{word:8} {name}" for word in ("missing", "changed", "extra") for name in getattr(self, word))
-        yield from (f"link     {name}" for name in self.links)
-        yield from (f"record   {what}" for what in self.record)
+        yield from (f"{_WORDS.get(key, key):8} {name}" for key, names in vars(self).items() for name in names)
         yield "differs from its record" if self else "as recorded"
 
 
@@ -113,7 +112,7 @@ def batch_differences(folder: Path, record: str, log: "Log | None" = None) -> Di
     from sensorgen.measure.log import Batch
 
     data, twice = read(folder / record, "a batch")
-    wrong = [*_of_record(data, twice), *_links_of_record(folder / record)]
+    wrong = [*_of_record(folder / record, data, twice)]
     logged = {row.file for row in log.entries(Batch, superseded=True) if row.batch == data.get("batch")} if log else ()
     if logged and sha256((folder / record).read_bytes()).hexdigest() not in logged:
         wrong.append(f"{record} is not the one that the log has of batch {data['batch']}")
@@ -138,7 +137,7 @@ def build_differences(folder: Path, design: Design, log: "Log | None" = None) ->
         No record, a damaged one, or a file that cannot be read.
     """
     data, twice = read(folder / store.MANIFEST, "a build")
-    wrong = [*_of_record(data, twice), *_links_of_record(folder / store.MANIFEST)]
+    wrong = [*_of_record(folder / store.MANIFEST, data, twice)]
     key = data.get("design")
     if key != design.id():
         wrong.append(f"the files are of design {shown(key)}; this one is {design.id()}")
@@ -153,13 +152,10 @@ def build_differences(folder: Path, design: Design, log: "Log | None" = None) ->
     return _compared(folder, store.MANIFEST, data["files"], tuple(wrong), others=True)
 
 
-def _of_record(data: Mapping[str, Any], twice: tuple[str, ...]) -> Iterator[str]:
+def _of_record(path: Path, data: Mapping[str, Any], twice: tuple[str, ...]) -> Iterator[str]:
     yield from (f"key {name!r:.60} stands twice" for name in twice)
     if data.get(SEAL, "" if "batch" in data else seal(data)) != seal(data):  # builds of version 0.1.0 have none
         yield "it does not hold what was written"
-
-
-def _links_of_record(path: Path) -> Iterator[str]:
     if path.is_symlink():
         yield f"{path.name} is a link"
 

@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from sensorgen.core import files, yamlfile
 from sensorgen.core.bounds import Bounds
-from sensorgen.core.display import Displayed
+from sensorgen.core.display import Boundless, Displayed
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding, Verdict, counted, counts, grouped, listed, most_severe, verdict
@@ -133,7 +133,7 @@ class Toolpath:
 
 
 @dataclass(frozen=True)
-class Trial(Displayed):
+class Trial(Boundless, Displayed):
     """One design tried.
 
     Attributes
@@ -161,8 +161,6 @@ class Trial(Displayed):
     rests_on : tuple of str
         Assumption that a press is read most wrongly by, and verdicts that assumptions alone lead to.
     """
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
     name: str
     design: str
@@ -376,7 +374,7 @@ class TriedChange:
 
 
 @dataclass(frozen=True)
-class Advice:
+class Advice(Boundless):
     """Attempts to remove the findings of a design.
 
     Attributes
@@ -398,8 +396,6 @@ class Advice:
     known : tuple of str
         Good designs of the shape that the budget left no time to predict.
     """
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
     tried: tuple[TriedChange, ...]
     now: str

@@ -39,7 +39,8 @@ from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.sweep import Sweep
 
 if TYPE_CHECKING:
-    from sensorgen.models.sheet import Port, PressErrors, Sheet
+    from sensorgen.solvers.sheet.parts import Port, Sheet
+    from sensorgen.solvers.sheet.solve import PressErrors
 
 _SEVERITIES = {"info": BLUE, "warning": ORANGE, "error": "#d1242f"}  # the most severe on top
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.core.leash import NOT_RUN, on_leash
 from sensorgen.export.slicers import TIME_LIMIT_S
-from sensorgen.scene.geometry.meshes import Mesh
+
+if TYPE_CHECKING:
+    from sensorgen.scene.geometry.meshes import Mesh  # with Shapely, which running a slicer does without
 
 KEPT_LINES = 12
 _TICK_S = 0.1
@@ -140,7 +142,7 @@ def _last_words(output: BinaryIO) -> str:
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
 
 
-def content(mesh: Mesh, shift_mm: NDArray[np.float64]) -> bytes:
+def content(mesh: "Mesh", shift_mm: NDArray[np.float64]) -> bytes:
     """The file of a mesh.
 
     Parameters

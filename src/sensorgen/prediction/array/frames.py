@@ -73,16 +73,24 @@ class PressureMaps:
     calibration: "ArrayCalibration | None" = None
     faults: tuple[str, ...] = ()
 
+    def _copied(self) -> tuple[Real, Real]:
+        """Pressures and standard errors, a row for each frame."""
+        rows = len(self.pressure_kpa), -1
+        return self.pressure_kpa.reshape(rows).copy(), self.sigma_kpa.reshape(rows).copy()
+
+    def _alike(self) -> Iterator[tuple[Mask, Mask]]:
+        """Frames whose pressures are known of the same crossings, and these crossings."""
+        masks, which = np.unique(np.isfinite(self._copied()[0]), axis=0, return_inverse=True)
+        return ((which.ravel() == k, known) for k, known in enumerate(masks))
+
     def on_surface(self) -> "PressureMaps":
         """Maps of the pressure on the cover, its spread undone; what is not determined is as what lies around it.
 
         Standard errors of more crossings than one matrix takes grow as those of an array without ends.
         """
-        shape = self.pressure_kpa.shape
-        pressure, sigma = (each.reshape(shape[0], -1).copy() for each in (self.pressure_kpa, self.sigma_kpa))
-        masks, which = np.unique(np.isfinite(pressure), axis=0, return_inverse=True)
-        for k, known in enumerate(masks):
-            at, (back, squares) = np.ix_(which.ravel() == k, known), _back(self.model, known.tobytes())
+        shape, (pressure, sigma) = self.pressure_kpa.shape, self._copied()
+        for frames, known in self._alike():
+            at, (back, squares) = np.ix_(frames, known), _back(self.model, known.tobytes())
             pressure[at] = back(pressure[at].T).T
             sigma[at] = sigma[at] * self.model.undone if squares is None else np.sqrt(sigma[at] ** 2 @ squares)
         lost = ~_known(sigma * PA_PER_KPA)
@@ -101,12 +109,10 @@ class PressureMaps:
 
         The squares of the errors of lost ones add up to that of their sum.
         """
-        shape = self.pressure_kpa.shape
-        pressure, sigma = (each.reshape(shape[0], -1).copy() for each in (self.pressure_kpa, self.sigma_kpa))
-        masks, which = np.unique(np.isfinite(pressure), axis=0, return_inverse=True)
-        for k, known in enumerate(masks):
+        shape, (pressure, sigma) = self.pressure_kpa.shape, self._copied()
+        for frames, known in self._alike():
             if known.any() and (self.model.here.ravel() & ~known).any():
-                frames, field = which.ravel() == k, _field(self.model, known.tobytes())
+                field = _field(self.model, known.tobytes())
                 near, lost = (np.ix_(frames, at) for at in (field.near, field.lost))
                 pressure[lost], sigma[lost] = field.at_lost(pressure[near], sigma[near])
         return pressure.reshape(shape), sigma.reshape(shape)

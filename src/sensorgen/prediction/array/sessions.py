@@ -16,20 +16,7 @@ from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.core.files import reading
-from sensorgen.prediction.array.elements import (
-    TARE_S,
-    UNLOADED,
-    ArraySession,
-    ElementLaw,
-    LawForm,
-    Past,
-    Sums,
-    doubtful_time,
-    learnt,
-    responding,
-    scale_of,
-    sums_of,
-)  # fmt: skip
+from sensorgen.prediction.array import elements
 from sensorgen.prediction.inference import NORMAL_90
 
 LEVEL = 0.9
@@ -66,7 +53,7 @@ class ArrayCalibration:
         Of the elements; none where they are numbered.
     """
 
-    law: ElementLaw
+    law: elements.ElementLaw
     floor_kpa: float
     share: float
     reach: float
@@ -75,7 +62,7 @@ class ArrayCalibration:
     quiet: Real
     names: tuple[str, ...] = ()
 
-    def pressures(self, session: ArraySession, tare: "Real | None" = None) -> tuple[Real, Real]:
+    def pressures(self, session: elements.ArraySession, tare: "Real | None" = None) -> tuple[Real, Real]:
         """Pressures, and half-widths of their intervals, (k, n); nan of dead elements and missing readings [kPa]."""
         mean, by_law = self.law.pressures(session, tare)
         own = self.floor_kpa**2 + (self.share * mean) ** 2
@@ -85,7 +72,7 @@ class ArrayCalibration:
         return mean, self.reach * np.sqrt(by_law**2 + own + of_session)
 
     def of_ratio(
-        self, ratio: Real, time_s: Real, day: float, past: "Past | None" = None
+        self, ratio: Real, time_s: Real, day: float, past: "elements.Past | None" = None
     ) -> tuple[Real, Real]:  # fmt: skip
         """Pressures and half-widths by capacitance over that at rest of each crossing, (k, m, n) [kPa]."""
         names, (k, m, n) = tuple(f"r{i + 1}c{j + 1}" for i, j in np.ndindex(ratio.shape[1:])), ratio.shape
@@ -97,7 +84,7 @@ class ArrayCalibration:
         if self.law.form.tau_s and not np.isfinite(time_s).all():
             raise BadInput("no time_s of the frames; expected it: the calibration has a memory")
         nothing = np.full((k, m * n), np.nan)
-        session = ArraySession(
+        session = elements.ArraySession(
             "", day, time_s, ratio.reshape(k, -1) - 1, nothing[:, 0] < 0, nothing, nothing[:, 0], past=past
         )
         mean, half = self.pressures(session, np.zeros(m * n))
@@ -117,7 +104,7 @@ class ArrayCalibration:
             raise BadInput("no 'day' of the readings; expected it, counted as in the sessions that calibrated")
         return self.law.day
 
-    def recognised(self, session: ArraySession) -> Mask:
+    def recognised(self, session: elements.ArraySession) -> Mask:
         """Frames of the first unloaded second, by the readings alone.
 
         A second is unloaded where no element moves by more than noise, and all readings differ from the tares of the
@@ -171,8 +158,8 @@ def stored(path: Path) -> ArrayCalibration:
         with reading(path), np.load(path, allow_pickle=False) as data:
             powers, tau_s, drift, tared, play = (*data["form"].tolist(), 0.0)[:5]
             day, rate, unsure, floor, share, reach, common = data["numbers"].tolist()
-            law = ElementLaw(
-                LawForm(int(powers), tau_s, bool(drift), bool(tared), play), float(data["scale"]), data["at"],
+            law = elements.ElementLaw(
+                elements.LawForm(int(powers), tau_s, bool(drift), bool(tared), play), float(data["scale"]), data["at"],
                 data["spread"], day, rate, unsure, data["alive"],
             )  # fmt: skip
             names = tuple(data["names"].tolist()) if "names" in data else ()
@@ -189,31 +176,31 @@ def _spread_of_tares(tares: Real) -> tuple[Real, float, Real]:
     return middle, float(common.std(ddof=1)), np.hypot(own, np.median(own)) / np.sqrt(2)
 
 
-def training(sessions: Sequence[ArraySession], held_out: int) -> list[ArraySession]:
+def training(sessions: Sequence[elements.ArraySession], held_out: int) -> list[elements.ArraySession]:
     """All sessions but one."""
     return [session for k, session in enumerate(sessions) if k != held_out]
 
 
-def law_of(sessions: Sequence[ArraySession], form: LawForm) -> ElementLaw:
+def law_of(sessions: Sequence[elements.ArraySession], form: elements.LawForm) -> elements.ElementLaw:
     """Law of every element by sessions, of a given form."""
-    scale = scale_of(sessions, form)
-    return _law([sums_of(session, form, scale) for session in sessions], form, scale)
+    scale = elements.scale_of(sessions, form)
+    return _law([elements.sums_of(session, form, scale) for session in sessions], form, scale)
 
 
-def _law(sums: Sequence[Sums], form: LawForm, scale: float) -> ElementLaw:
-    alive = responding(sums)
+def _law(sums: Sequence[elements.Sums], form: elements.LawForm, scale: float) -> elements.ElementLaw:
+    alive = elements.responding(sums)
     if not alive.any():
         raise BadInput("no element's reading follows its reference; expected half of its variance or more of one")
-    return learnt(sums, form, scale, alive)
+    return elements.learnt(sums, form, scale, alive)
 
 
-def chosen(sessions: Sequence[ArraySession]) -> LawForm:
+def chosen(sessions: Sequence[elements.ArraySession]) -> elements.LawForm:
     """Form of the law that leaves the least error in sessions left out; a further term has to lower it by 2 %.
 
     Powers first, then a play, which is alike at all speeds, then a memory in time, then a drift of the gain; of one
     session a cubic.
     """
-    best, error = LawForm(), _left_out(sessions, LawForm())
+    best, error = elements.LawForm(), _left_out(sessions, elements.LawForm())
     if len(sessions) < 2:
         return best
     for options in (
@@ -229,7 +216,7 @@ def chosen(sessions: Sequence[ArraySession]) -> LawForm:
     return best
 
 
-def _joined(base: LawForm, option: LawForm) -> LawForm:
+def _joined(base: elements.LawForm, option: elements.LawForm) -> elements.LawForm:
     """The base with what an option has beyond the usual form."""
     return replace(
         base, powers=min(base.powers, option.powers), tau_s=option.tau_s or base.tau_s,
@@ -237,12 +224,12 @@ def _joined(base: LawForm, option: LawForm) -> LawForm:
     )  # fmt: skip
 
 
-def _left_out(sessions: Sequence[ArraySession], form: LawForm) -> float:
+def _left_out(sessions: Sequence[elements.ArraySession], form: elements.LawForm) -> float:
     """Mean over sessions of the median error of an element in a session left out [kPa]; by totals where alone [N]."""
     if len(sessions) < 2:
         return float("inf")
-    scale = scale_of(sessions, form)
-    sums = [sums_of(session, form, scale) for session in sessions]
+    scale = elements.scale_of(sessions, form)
+    sums = [elements.sums_of(session, form, scale) for session in sessions]
     found = []
     for k, own in enumerate(sums):
         law = _law(sums[:k] + sums[k + 1 :], form, scale)
@@ -250,7 +237,7 @@ def _left_out(sessions: Sequence[ArraySession], form: LawForm) -> float:
     return float(np.mean(found))
 
 
-def _error(own: Sums, law: ElementLaw) -> float:
+def _error(own: elements.Sums, law: elements.ElementLaw) -> float:
     at = np.exp(law.drift * (own.day - law.day)) * law.at
     if own.count.any():
         net = own.gram - own.noise
@@ -260,7 +247,7 @@ def _error(own: Sums, law: ElementLaw) -> float:
     return float(np.sqrt(np.mean((own.force - own.total(at * law.alive[:, None])) ** 2)))
 
 
-def calibrated(sessions: Sequence[ArraySession], form: "LawForm | None" = None) -> ArrayCalibration:
+def calibrated(sessions: Sequence[elements.ArraySession], form: "elements.LawForm | None" = None) -> ArrayCalibration:
     """Calibration by sessions, its form chosen among them if none is given.
 
     The intervals' width is set by errors in each of them left out in turn; of one session by its own residuals.
@@ -277,16 +264,20 @@ def calibrated(sessions: Sequence[ArraySession], form: "LawForm | None" = None) 
     off_pairs, mean_pairs = np.sum([pairs for *_, pairs in errors], 0).tolist()
     share = off_pairs / mean_pairs if mean_pairs > 0 else 0.0
     common = float(np.sqrt(max(share, 0.0) * (1 + 1 / len(sessions))))  # of one session more
-    off, mean, sigma = (np.concatenate(each) for each in list(zip(*errors, strict=True))[:3])
+    offs, means, sigmas, _ = zip(*errors, strict=True)
+    off, mean, sigma = np.concatenate(offs), np.concatenate(means), np.concatenate(sigmas)
+    counts = [len(each) for each in offs]
+    alike = np.repeat(1 / np.maximum(counts, 1), counts)  # a long session counts no more than others
     names = sessions[0].names
     if not off.size:  # total forces alone: the parameters' covariance is what is known
         return ArrayCalibration(law, 0.0, 0.0, NORMAL_90, common, tares, quiet, names)
     floor, share = _scale(np.maximum(off**2 - sigma**2, 0.1 * off**2), mean)
-    reach = float(np.quantile(np.abs(off) / np.sqrt(sigma**2 + floor**2 + (share * mean) ** 2), LEVEL))
+    size = np.abs(off) / np.sqrt(sigma**2 + floor**2 + (share * mean) ** 2)
+    reach = float(np.quantile(size, LEVEL, weights=alike, method="inverted_cdf"))
     return ArrayCalibration(law, floor, share, reach, common, tares, quiet, names)
 
 
-def _residuals(session: ArraySession, law: ElementLaw) -> tuple[Real, Real, Real, Real]:
+def _residuals(session: elements.ArraySession, law: elements.ElementLaw) -> tuple[Real, Real, Real, Real]:
     """Errors, pressures and standard errors by the parameters, of loaded frames evenly taken [kPa].
 
     And sums over frames of the products of two different elements' errors, and of their pressures, (2,) [kPa2]: what
@@ -295,7 +286,7 @@ def _residuals(session: ArraySession, law: ElementLaw) -> tuple[Real, Real, Real
     mean, sigma = law.pressures(session)
     size = np.abs(session.pressure_kpa)
     with np.errstate(invalid="ignore"):
-        known = (size > UNLOADED * np.nanmax(size, initial=0.0)) & np.isfinite(mean)
+        known = (size > elements.UNLOADED * np.nanmax(size, initial=0.0)) & np.isfinite(mean)
     step = max(1, len(mean) // _FRAMES)
     off = np.where(known, mean - session.pressure_kpa, 0.0)
     pairs = np.array([_pairs(of) for of in (off, np.where(known, mean, 0.0))])
@@ -350,14 +341,14 @@ class CalibrationStudy:
     """
 
     calibration: ArrayCalibration
-    sessions: tuple[ArraySession, ...]
+    sessions: tuple[elements.ArraySession, ...]
     errors: tuple[SessionError, ...]
     by_first: bool = False
 
     def document(self) -> Iterator[Part]:
         """The law, and a row for each session."""
         yield Facts(tuple(self._facts()))
-        yield from (f"{line}: {of.name}" for of in self.sessions for line in doubtful_time(of.time_s))
+        yield from (f"{line}: {of.name}" for of in self.sessions for line in elements.doubtful_time(of.time_s))
         if not self.errors:
             yield "one session: its errors in another are not known; expected more, of several days"
             return
@@ -369,7 +360,10 @@ class CalibrationStudy:
 
     def _facts(self) -> Iterator[tuple[str, str]]:
         known, law = self.calibration, self.calibration.law
-        yield "sessions", f"{len(self.sessions)}, {len(law.alive)} elements; tare: {TARE_S:g} unloaded seconds of each"
+        yield (
+            "sessions",
+            f"{len(self.sessions)}, {len(law.alive)} elements; tare: {elements.TARE_S:g} unloaded seconds of each",
+        )
         drift = f", gain {100 * law.drift:+.2g} % a day" if law.form.drift else ""
         gains = law.at[law.alive, 0]
         scatter = 100 * gains.std() / abs(gains.mean())
@@ -386,7 +380,7 @@ class CalibrationStudy:
             yield "dead", f"{dead.size} elements, from 1: {', '.join(map(str, dead[:_SHOWN].tolist()))}{more}"
 
 
-def study(sessions: Sequence[ArraySession], *, by_first: bool = False) -> CalibrationStudy:
+def study(sessions: Sequence[elements.ArraySession], *, by_first: bool = False) -> CalibrationStudy:
     """Calibrate by all sessions, and test on each by all others, or by the first alone.
 
     Raises
@@ -402,7 +396,7 @@ def study(sessions: Sequence[ArraySession], *, by_first: bool = False) -> Calibr
     return CalibrationStudy(calibrated(sessions), tuple(sessions), tuple(errors), by_first)
 
 
-def _refuse(sessions: Sequence[ArraySession]) -> None:
+def _refuse(sessions: Sequence[elements.ArraySession]) -> None:
     count = sessions[0].reading.shape[1]
     for k, session in enumerate(sessions):
         if any(np.array_equal(session.reading, other.reading, equal_nan=True) for other in sessions[:k]):
@@ -413,18 +407,18 @@ def _refuse(sessions: Sequence[ArraySession]) -> None:
             raise BadInput(f"{session.name}: no reference; expected pressure_kpa, or force_n of a press or a plate")
 
 
-def _tested(sessions: Sequence[ArraySession], k: int, others: Sequence[ArraySession]) -> SessionError:
+def _tested(sessions: Sequence[elements.ArraySession], k: int, others: Sequence[elements.ArraySession]) -> SessionError:
     """Errors in one session of calibrations by others."""
     session, found = sessions[k], calibrated(others)
     mean, half = found.pressures(session)
     known = np.isfinite(session.pressure_kpa) & np.isfinite(mean)
     inside = (np.abs(mean - session.pressure_kpa) < half)[known]
-    plain = (law_of(others, LawForm(tared=tared)).pressures(session)[0] for tared in (False, True))
+    plain = (law_of(others, elements.LawForm(tared=tared)).pressures(session)[0] for tared in (False, True))
     static, tared, own = (median_error(each, session) for each in (*plain, mean))
     return SessionError(session.name, found.law.form.words(), static, tared, own, float(inside.mean()))
 
 
-def median_error(mean: Real, session: ArraySession) -> float:
+def median_error(mean: Real, session: elements.ArraySession) -> float:
     """Median over elements of the rms error in a session [kPa]."""
     off = mean - session.pressure_kpa
     with np.errstate(invalid="ignore"):

@@ -11,16 +11,9 @@ from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.document import Cell, Column, Facts, Part, Table, to_json
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM, si
+from sensorgen.prediction.array import readout as readouts
 from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
-from sensorgen.prediction.array.readout import (
-    FULL_SCALE_PA,
-    MOST_DENSE,
-    ArrayReadout,
-    covariance,
-    crosstalk,
-    faulty,
-    information,
-)
+from sensorgen.prediction.array.readout import ArrayReadout
 
 PRESS_N, PRESS_MM = 6.0, 10.0  # force of a press, and side of the square that it is on
 APART = 3.0  # standard errors
@@ -129,7 +122,7 @@ class ArrayStudy:
     @property
     def determined(self) -> Mask:
         """Crossings whose pressure a frame determines, (m, n) of bool."""
-        return np.asarray(self.sigma_kpa < DETERMINED * FULL_SCALE_PA / PA_PER_KPA)
+        return np.asarray(self.sigma_kpa < DETERMINED * readouts.FULL_SCALE_PA / PA_PER_KPA)
 
     @property
     def sigma_n(self) -> Real:
@@ -235,8 +228,9 @@ class ArrayStudy:
                 f"crosstalk: another crossing changes a reading by at most {finite.max():.2g} of what its own does "
                 f"(median {np.median(finite):.2g})"
             )
-        if self.model.here.size > MOST_DENSE:
-            yield f"above {MOST_DENSE} crossings each standard error is as if all other capacitances were known"
+        if self.model.here.size > readouts.MOST_DENSE:
+            most = readouts.MOST_DENSE
+            yield f"above {most} crossings each standard error is as if all other capacitances were known"
         yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
         yield "left out: strays of the cable, contact resistance"
 
@@ -292,24 +286,18 @@ def study(
     ratio, slope = model.under(np.array(pressure_kpa * PA_PER_KPA))
     per_pa = model.capacitance.value * float(slope)
     whole = model.tracks(model.capacitances(float(ratio)))
-    read = readout.read(faulty(whole, faults, model.here))
-    prior = np.where(model.here, per_pa * FULL_SCALE_PA, 1e-6 * model.capacitance.value).ravel()
-    known = _on_surface(information(read, readout, model.here, readout.read(whole) if faults else None), model)
-    spread = covariance(known, prior)
+    read = readout.read(readouts.faulty(whole, faults, model.here))
+    prior = np.where(model.here, per_pa * readouts.FULL_SCALE_PA, 1e-6 * model.capacitance.value).ravel()
+    found = readouts.information(read, readout, model.here, readout.read(whole) if faults else None)
+    known = (found / model.undone**2) if found.ndim == 1 else (np.asarray(model.spread.T @ found @ model.spread))
+    spread = readouts.covariance(known, prior)
     variance = spread if spread.ndim == 1 else np.diag(spread)
     sigma = np.sqrt(variance).reshape(model.here.shape) / per_pa / PA_PER_KPA
-    small = model.here.size <= MOST_DENSE
+    small = model.here.size <= readouts.MOST_DENSE
     return ArrayStudy(
-        model, readout, pressure_kpa, np.where(model.here, sigma, np.nan), crosstalk(read[0]) if small else None,
-        tuple(faults), distance_mm(model, known * per_pa**2), short,
+        model, readout, pressure_kpa, np.where(model.here, sigma, np.nan),
+        readouts.crosstalk(read[0]) if small else None, tuple(faults), distance_mm(model, known * per_pa**2), short,
     )  # fmt: skip
-
-
-def _on_surface(found: Real, model: ArrayModel) -> Real:
-    """Information on pressures on the surface by that on those that cells carry, (k, k), or each alone, (k,)."""
-    if found.ndim == 1:
-        return found / model.undone**2
-    return np.asarray(model.spread.T @ found @ model.spread)
 
 
 def _map(values: Real) -> list[list[float | None]]:

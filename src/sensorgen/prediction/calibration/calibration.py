@@ -210,7 +210,7 @@ class Calibration:
         if noise is not None:
             known = replace(known, noise=np.broadcast_to(noise, known.noise.shape))
         otherwise = OTHERWISE if self.allowance else 0.0
-        return Inverter(self.model, known, prior, limit_n or self.limit_n, otherwise=otherwise)
+        return Inverter(self.model, known, prior, limit_n or self.limit_n, otherwise=otherwise, session=True)
 
     @property
     def allowance(self) -> tuple[str, ...]:

@@ -6,21 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.prediction import inference
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, no_presses
-from sensorgen.prediction.inference import (
-    Index,
-    LeastSquares,
-    LocalFit,
-    Normal,
-    descend,
-    parts,
-    slopes,
-    standard,
-    whitening,
-)
+from sensorgen.prediction.inference import LocalFit, Normal, parts, whitening
 
 ROUNDS = 3  # Gauss-Newton and variance components in turn
-_FARTHEST = 8.0  # standard deviations: beyond, readings that no specimen gives lead to numbers that no line takes
 NOISE = 1e-3  # of the parts of a ratio, where no press tells
 _FEWEST_COURSES = 10  # presses from which on their usual course is known
 _FLOOR = 1e-5  # of ln Z: no bench is right to more
@@ -92,7 +82,7 @@ class Data:
     single: Real | None = None
     meter: MeterReadings | None = None
 
-    def rows(self, which: Index | Mask) -> "Data":
+    def rows(self, which: inference.Index | Mask) -> "Data":
         """Some of the presses."""
         return replace(self, presses=self.presses.rows(which), ratio=self.ratio[which], noise=self.noise[which])
 
@@ -150,7 +140,7 @@ def prior(model: SpecimenModel, noise: Real) -> Posterior:
     noise : (m,) array
         Standard deviation of a ratio's real and imaginary part [-].
     """
-    before, spread = standard(len(model.names)), model.spread
+    before, spread = inference.standard(len(model.names)), model.spread
     mean = float(np.exp(_LN_SPREAD**2 / 2))  # of a logarithmic normal, over its median
     scatter, wander = spread.scatter * mean, spread.wander * mean
     return Posterior(before.at, before.covariance, scatter, wander, wander, *_USUAL, noise, 0)
@@ -273,7 +263,7 @@ def readings(model: SpecimenModel, posterior: Posterior, force_n: Real, position
 
 
 @dataclass(frozen=True, eq=False)
-class _Specimen(LeastSquares):
+class _Specimen(inference.LeastSquares):
     """Known presses and readings at rest, of parameters with what was known before."""
 
     model: SpecimenModel
@@ -284,7 +274,7 @@ class _Specimen(LeastSquares):
     reach = 3.0
     bound = 8.0  # beyond, readings that no specimen gives lead to numbers that no line takes
 
-    def fit(self, at: Real, rows: Index) -> LocalFit:  # noqa: ARG002
+    def fit(self, at: Real, rows: inference.Index) -> LocalFit:  # noqa: ARG002
         """Sum of squares at parameters (1, p)."""
         fit = _pressed(at, *self.ratios(at[0]), self.root) + self.resting(at)
         return fit.with_prior(self.before.at, self.before.information)
@@ -302,7 +292,7 @@ class _Specimen(LeastSquares):
             bench = parts(data.rest - self.model.rest(near)) @ root.T
             return np.concatenate([bench, data.meter.off(self.model, near)], -1) if data.meter else bench
 
-        return LocalFit.of(at, off(at), -slopes(off, at[0]).T[None])
+        return LocalFit.of(at, off(at), -inference.slopes(off, at[0]).T[None])
 
 
 def _pressed(at: Real, residual: Real, slope: Real, root: Real) -> LocalFit:
@@ -313,13 +303,15 @@ def _pressed(at: Real, residual: Real, slope: Real, root: Real) -> LocalFit:
 
 def _descended(model: SpecimenModel, data: Data, at: Real, components: Real, before: Normal) -> LocalFit:
     """Most probable parameters (1, p), and the information on them."""
-    return descend(_Specimen(model, data, before, whitening(covariances(model, at, data, components))), at[None])
+    return inference.descend(
+        _Specimen(model, data, before, whitening(covariances(model, at, data, components))), at[None]
+    )
 
 
 def information(model: SpecimenModel, data: Data, at: Real, components: Real) -> Real:
     """Information of presses and rest on the parameters (p, p), the prior's left out; parameters as covariances."""
     root = whitening(covariances(model, at, data, components))
-    specimen = _Specimen(model, data, standard(len(at)), root)
+    specimen = _Specimen(model, data, inference.standard(len(at)), root)
     fit = _pressed(at[None], *specimen.ratios(at), root) + specimen.resting(at[None])
     return np.asarray(fit.information[0])
 
@@ -366,7 +358,7 @@ def shared(models: Sequence[SpecimenModel], posteriors: Sequence[Posterior], nam
         Parameters in common.
     """
     which = [models[0].names.index(name) for name in names]
-    told = [p.part(which).beyond(standard(len(which))) for p in posteriors]
+    told = [p.part(which).beyond(inference.standard(len(which))) for p in posteriors]
     covariance = np.asarray(np.linalg.inv(np.eye(len(which)) + sum(information for information, _ in told)), float)
     common = Normal(covariance @ sum(pull for _, pull in told), covariance)
     return [p.given(which, common) for p in posteriors]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.prediction.calibration.fitting import Posterior, pairs, readings, usual_presses
-from sensorgen.prediction.calibration.rest import STALE_S
+from sensorgen.prediction.calibration.rest import LOADS_N, STALE_S, load_probabilities
 from sensorgen.prediction.calibration.specimen import SpecimenModel
 from sensorgen.prediction.inference import NORMAL_90, Index, Samples, cramer_rao, parts, whitening
 from sensorgen.prediction.inverse.estimator import Prior
@@ -31,6 +31,12 @@ _PARTS = 3  # of a cell of the grid, over which the density falls
 _COARSEST = 4.0  # change of ln of the density over a cell from which on it counts as even there
 _FEW_TONES = 2
 OTHERWISE = 0.1  # probability, until a recheck, that something else than the press makes a part of the reading: a guess
+_LOADED = 0.2  # probability, before any reading, that something lay on the sensor at rest: a guess
+_CONFINED = 0.2  # probability, before any reading, that a session's presses are all on a part of the sensor: a guess
+_STRETCHES = np.array([  # such parts, start and end over the length: places share errors, so that none is shorter
+    (0.0, 1.0), *((start, start + of) for of in (0.1, 0.2, 0.4, 0.6, 0.8) for start in np.arange(0, 1.01 - of, 0.05)),
+])  # fmt: skip
+_RARE = 0.005  # probability of a load at rest below which it is left out
 _BELOW = 0.3  # share of what lies outside an interval that is below it, where that something is allowed for
 _MORE = 3.2905267314919255  # standard deviations that noise exceeds once in a thousand
 _BELOW_REST = 4.0  # standard deviations that noise exceeds in three readings of 100 000
@@ -81,6 +87,8 @@ class InvertedPresses(Samples):
         Deviation there towards another capacitance elsewhere, in standard deviations [-].
     below : (n,) array
         Capacitance by which the reading lies below its reading at rest, in standard deviations [-].
+    stretches : (n, s) array
+        Probability of the reading under presses on a stretch of the sensor, over that under presses anywhere [-].
     tones : (n,) array
         Number of frequencies that count.
     verdict : (n,) array
@@ -94,21 +102,55 @@ class InvertedPresses(Samples):
     chi2: Real
     more: Real
     below: Real
+    stretches: Real
     tones: Index
     verdict: NDArray[np.uint8]
 
 
+class _Readings(NamedTuple):
+    """Readings over those at rest, and loads that may have lain on the sensor at rest, the most probable one last.
+
+    Attributes
+    ----------
+    parts : (n, 2 m) array
+        Of ln of the ratio.
+    on_stretch : (n, s) array
+        Factor on the probability of places on each stretch of the sensor.
+    chance : (k,) array
+        Probability of each load.
+    by_load : (k, 2 m) array
+        Parts of ln Z at rest under it over that of the free sensor.
+    """
+
+    parts: Real
+    on_stretch: Real
+    chance: Real
+    by_load: Real
+
+    def rows(self, which: Index) -> "_Readings":
+        """Some of the readings."""
+        return self._replace(parts=self.parts[which], on_stretch=self.on_stretch[which])
+
+
 class _Table(NamedTuple):
-    """Whitening of a set of tones at every point of the grid, and the mean there, whitened."""
+    """Whitening of a set of tones at every point of the grid, and the mean there, whitened.
+
+    Attributes
+    ----------
+    root : (points * k, k) array
+        Of k parts of the reading.
+    mean : (points, k) array
+        Whitened.
+    ln_density : (points,) array
+        Without the distance.
+    more : (points, k) array
+        Unit vectors, whitened, towards another capacitance elsewhere; nan where not computed yet.
+    """
 
     root: NDArray[np.float32]
-    """(points * k, k), of k parts of the reading."""
     mean: NDArray[np.float32]
-    """(points, k)."""
     ln_density: Real
-    """(points,), without the distance."""
     more: Real
-    """(points, k), unit vectors, whitened, towards another capacitance elsewhere; nan where not computed yet."""
 
 
 class Inverter:
@@ -130,6 +172,9 @@ class Inverter:
         Probability that the press makes a share of a reading alone [-]: the sensor is softer or the tip wider than in
         the calibration, or something else is there, and the frequencies do not separate these. The share is below s
         with the probability sqrt(s).
+    session : bool
+        A batch is of one session: all of its readings together tell whether something lay on the sensor at rest, and,
+        for the force, on which part of the sensor all presses are. Readings that tell neither are as apart.
 
     Attributes
     ----------
@@ -142,16 +187,15 @@ class Inverter:
     def __init__(
         self, model: SpecimenModel, posterior: Posterior, prior: Prior | None = None,
         force_limit_n: float = FORCE_LIMIT_N, level: float = LEVEL, otherwise: float = 0.0,
+        session: bool = False,
     ) -> None:  # fmt: skip
-        self.level, self._otherwise = level, otherwise
+        self.level, self._otherwise, self._session = level, otherwise, session
         self._posterior, self._length = posterior, model.sensor.length_m
         coarse = np.linspace(0, 1, _COARSE[0]) ** 2 * force_limit_n, np.linspace(0, self._length, _COARSE[1])
         mean, covariance = readings(model, posterior, *coarse)
         self._position_error_m = coarse[0], np.minimum(_position_errors(coarse, mean, covariance), self._length)
         self.force_n, self.position_m = _grid(coarse, mean, covariance)
-        self._means, self._covariances = (
-            _refined(coarse, (self.force_n, self.position_m), v) for v in (mean, covariance)
-        )
+        self._covariances = _refined(coarse, (self.force_n, self.position_m), covariance)
         self._mean = parts(model.ratio(posterior.at, usual_presses(posterior, *pairs(self.force_n, self.position_m))))
         self._weight = np.log(_steps(self.force_n)[:, None] * _steps(self.position_m)).ravel()
         for axis, normal in enumerate(() if prior is None else (prior.force_n, prior.position_m)):
@@ -159,17 +203,15 @@ class Inverter:
                 at = pairs(self.force_n, self.position_m)[axis]
                 self._weight = self._weight - ((at - normal[0]) / normal[1]) ** 2 / 2
         self._tables: dict[bytes, _Table] = {}
-        shaped = self._mean.reshape(len(self.force_n), len(self.position_m), -1)
-        grid = (self.force_n, self.position_m)
-        self._tangents = np.stack([np.gradient(shaped, at, axis=k) for k, at in enumerate(grid)], -1).reshape(
-            *self._mean.shape, 2
-        )
+        self._tangents = _slopes((self.force_n, self.position_m), self._mean)
         self._elsewhere = _elsewhere(model, posterior, force_limit_n)
-        fall = -model.scatters(posterior.at, usual_presses(posterior, np.zeros(1), np.full(1, self._length / 2)))[
-            0, :, 1
-        ]
+        at_rest = usual_presses(posterior, LOADS_N, np.full(len(LOADS_N), self._length / 2))
+        fall = -model.scatters(posterior.at, at_rest.rows(LOADS_N == 0))[0, :, 1]
         weighted = np.linalg.solve(self._covariances[0], fall)
         self._fall = weighted / np.sqrt(fall @ weighted)
+        by_load = parts(model.ratio(posterior.at, at_rest))
+        self._by_load = by_load - by_load[0]
+        self._stretches = _stretches(_edges(self.position_m) / self._length)
 
     def batch(self, ratio: Complex, rest_age_s: Real | None = None, changed: Mask | None = None) -> InvertedPresses:
         """Presses behind readings.
@@ -192,24 +234,52 @@ class Inverter:
         if ratio.ndim != 2 or ratio.shape[1] != m:
             raise BadInput(f"readings of shape {ratio.shape}; expected (n, {m}), a column for each calibrated tone")
         measured = np.isfinite(ratio)
-        presses = nothing(len(ratio))
-        for pattern in np.unique(measured, axis=0):
-            rows = np.flatnonzero((measured == pattern).all(axis=1))
-            if pattern.sum() >= _FEW_TONES:
-                self._put(presses, rows, ratio, pattern)
-        presses.below[:] = parts(ratio) @ self._fall
-        bad = np.flatnonzero(~_one_press(presses) & ~_more(presses))
-        if bad.size:
-            self._without_one(presses, bad, ratio, measured)
+        below = parts(ratio) @ self._fall
+        anywhere = np.eye(1, len(_STRETCHES)).repeat(len(ratio), 0)
+        readings = _Readings(parts(ratio), anywhere, np.ones(1), self._by_load[:1])
+        session = self._session and len(ratio) > 1
+        if session and (below > 0).any():
+            readings = self._with_rest(readings, below)
+        presses = self._inverted(readings, measured)
+        if session:
+            chance = _stretch_probabilities(presses)
+            if chance[0] < 1 - _CONFINED:
+                factors = chance / np.maximum(presses.stretches, 1e-300)
+                presses = self._inverted(readings._replace(on_stretch=factors), measured)
+        presses.below[:] = below
         stale = np.zeros(len(ratio), bool) if rest_age_s is None else ~(rest_age_s <= STALE_S)
         return self._judged(presses, stale, np.zeros(len(ratio), bool) if changed is None else changed)
 
-    def _put(self, presses: InvertedPresses, rows: Index, ratio: Complex, tones: Mask) -> None:
+    def _with_rest(self, readings: _Readings, below: Real) -> _Readings:
+        """Readings with the loads at rest that those below it show."""
+        chance = load_probabilities(below, -self._by_load @ self._fall, _LOADED)
+        if chance[0] >= 1 - _LOADED:
+            return readings
+        order = np.argsort(chance)[np.sort(chance) > _RARE]
+        return readings._replace(chance=chance[order], by_load=self._by_load[order])
+
+    def _inverted(self, readings: _Readings, measured: Mask) -> InvertedPresses:
+        """Presses behind readings by their measured tones (n, m), without one of them where no press explains all."""
+        presses = self._by_tones(readings, measured, _FEW_TONES)
+        bad = np.flatnonzero(~_one_press(presses) & ~_more(presses))
+        if bad.size:
+            self._without_one(presses, bad, readings, measured)
+        return presses
+
+    def _by_tones(self, readings: _Readings, measured: Mask, fewest: int) -> InvertedPresses:
+        """Presses behind readings of which at least so many tones were measured (n, m)."""
+        presses = nothing(len(measured))
+        for tones in np.unique(measured, axis=0):
+            if tones.sum() >= fewest:
+                self._put(presses, np.flatnonzero((measured == tones).all(axis=1)), readings, tones)
+        return presses
+
+    def _put(self, presses: InvertedPresses, rows: Index, readings: _Readings, tones: Mask) -> None:
         columns = np.flatnonzero(np.tile(tones, 2))
         table = self._table(tones, columns)
 
         def put(some: Index) -> None:
-            block = self._block(parts(ratio[some][:, tones]), table, columns)
+            block = self._block(readings.rows(some), table, columns)
             presses.put(some, replace(block, tones=np.full(len(some), tones.sum())))
 
         blocks = [rows[start : start + _BLOCK] for start in range(0, len(rows), _BLOCK)]
@@ -219,40 +289,42 @@ class Inverter:
         with ThreadPoolExecutor(2) as pool:
             list(pool.map(put, blocks))
 
-    def _without_one(self, presses: InvertedPresses, rows: Index, ratio: Complex, measured: Mask) -> None:
+    def _without_one(self, presses: InvertedPresses, rows: Index, readings: _Readings, measured: Mask) -> None:
         """Of readings that no press explains, leave out the tone whose absence explains the most."""
-        best = nothing(len(rows))
-        for tone in range(ratio.shape[1]):
-            left = measured[rows].copy()
+        best, bad = nothing(len(rows)), readings.rows(rows)
+        for tone in range(measured.shape[1]):
+            left = measured[rows]
             left[:, tone] = False
-            trial = nothing(len(rows))
-            for pattern in np.unique(left, axis=0):
-                if pattern.sum() >= max(_FEW_TONES, ratio.shape[1] // 2):
-                    self._put(trial, np.flatnonzero((left == pattern).all(axis=1)), ratio[rows], pattern)
+            trial = self._by_tones(bad, left, max(_FEW_TONES, measured.shape[1] // 2))
             better = (trial.chi2 <= chi2_limit(2 * trial.tones - 2)) & ~(best.chi2 <= trial.chi2)
             best.put(better, trial.rows(better))
         good = np.isfinite(best.chi2)
         presses.put(rows[good], best.rows(good))
 
-    def _block(self, reading: Real, table: _Table, columns: Index) -> InvertedPresses:
-        k = reading.shape[1]
-        white = (table.root @ reading.T.astype(np.float32)).reshape(-1, k, len(reading))
-        white -= table.mean[:, :, None]
-        chi2 = np.square(white).sum(1, dtype=np.float64)
-        best = chi2.argmin(0)
-        each = np.arange(len(best))
+    def _block(self, readings: _Readings, table: _Table, columns: Index) -> InvertedPresses:
+        k, each = len(columns), np.arange(len(readings.parts))
+        density = np.zeros((len(table.mean), len(each)))
+        for chance, by_load in zip(readings.chance, readings.by_load, strict=True):
+            ratio = (readings.parts + by_load)[:, columns]
+            white = (table.root @ ratio.T.astype(np.float32)).reshape(-1, k, len(each))
+            white -= table.mean[:, :, None]
+            chi2 = np.square(white).sum(1, dtype=np.float64)
+            ln = table.ln_density[:, None] - chi2 / 2
+            under_load = np.exp(ln - ln.max(0))
+            density += under_load * (chance / under_load.sum(0))
+        best = chi2.argmin(0)  # by the most probable load
         if fresh := [int(point) for point in np.unique(best) if np.isnan(table.more[point, 0])]:
             table.more[fresh] = self._towards_more(table.root.reshape(-1, k, k)[fresh], fresh, columns)
         more = np.abs(np.einsum("nk,nk->n", table.more[best], white[best, :, each]))
-        ln = table.ln_density[:, None] - chi2 / 2
-        ln -= ln.max(0)
-        density = np.exp(ln).reshape(len(self.force_n), len(self.position_m), -1)
-        force, position = _finer(self.force_n, density.sum(1)), _finer(self.position_m, density.sum(0))
+        shaped = density.reshape(len(self.force_n), len(self.position_m), -1)
+        by_place = shaped.sum(0)
+        by_force = np.einsum("fxn,nx->fn", shaped, readings.on_stretch @ self._stretches)
+        force, position = _finer(self.force_n, by_force), _finer(self.position_m, by_place)
         return replace(
             nothing(len(each)),
             force_n=_quantiles(*force, (0.5,))[:, 0], force_90_n=self._force_ends(*force),
             position_m=_quantiles(*position, (0.5,))[:, 0], position_90_m=_densest(*position, self.level),
-            chi2=chi2[best, each], more=more,
+            chi2=chi2[best, each], more=more, stretches=by_place.T @ self._stretches.T,
         )  # fmt: skip
 
     def _force_ends(self, edges: Real, force: Real) -> Real:
@@ -346,26 +418,45 @@ def nothing(n: int) -> InvertedPresses:
     """Results of readings in which nothing was found yet."""
     (force, place, *others), ends = np.full((5, n), np.nan), np.full((2, n, 2), np.nan)
     tones, verdict = np.zeros(n, np.intp), np.full(n, Verdict.MISSING, np.uint8)
-    return InvertedPresses(force, place, ends[0], ends[1], others[0], others[1], others[2], tones, verdict)
+    stretches = np.full((n, len(_STRETCHES)), np.nan)
+    return InvertedPresses(force, place, ends[0], ends[1], others[0], others[1], others[2], stretches, tones, verdict)
+
+
+def _stretches(edges: Real) -> Real:
+    """Density of places on each stretch over that on all of the sensor (s, x), in cells between borders (x + 1,)."""
+    start, end = _STRETCHES.T[:, :, None]
+    within = np.maximum(np.minimum(edges[1:], end) - np.maximum(edges[:-1], start), 0.0)
+    return np.asarray(within / (end - start) / np.diff(edges))
+
+
+def _stretch_probabilities(presses: InvertedPresses) -> Real:
+    """Probabilities that the presses of a session are on all of the sensor, and on each stretch (s,)."""
+    fits = presses.chi2 <= chi2_limit(2 * presses.tones - 2)
+    ln = np.log(np.maximum(presses.stretches[fits], 1e-300)).sum(0)
+    before = np.append(1 - _CONFINED, np.full(len(ln) - 1, _CONFINED / (len(ln) - 1)))
+    chance = before * np.exp(ln - ln.max())
+    return np.asarray(chance / chance.sum())
 
 
 def _position_errors(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> Real:
     """Standard error of the position at each force of a grid, the median over positions [m]."""
-    shape = len(coarse[0]), len(coarse[1])
-    slopes = [np.asarray(np.gradient(mean.reshape(*shape, -1), at, axis=k)) for k, at in enumerate(coarse)]
-    white = whitening(covariance)
-    _, error, _ = cramer_rao(*(np.einsum("gij,gj->gi", white, slope.reshape(mean.shape)) for slope in slopes))
-    return np.asarray(np.median(np.nan_to_num(error, nan=np.inf).reshape(shape), axis=1))
+    _, error, _ = cramer_rao(*np.einsum("gij,gjk->kgi", whitening(covariance), _slopes(coarse, mean)))
+    return np.asarray(np.median(np.nan_to_num(error, nan=np.inf).reshape(len(coarse[0]), -1), axis=1))
+
+
+def _slopes(grid: tuple[Real, Real], mean: Real) -> Real:
+    """Derivatives of a mean (points, k) by force and by position (points, k, 2)."""
+    shaped = mean.reshape(len(grid[0]), len(grid[1]), -1)
+    slopes = np.stack([np.gradient(shaped, at, axis=axis) for axis, at in enumerate(grid)], -1)
+    return slopes.reshape(*mean.shape, 2)
 
 
 def _grid(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> tuple[Real, Real]:
     """Forces and positions, as far apart as a reading can tell them, within limits."""
-    shape = len(coarse[0]), len(coarse[1])
-    weight = np.linalg.inv(covariance)
-    axes = []
+    slopes, axes = _slopes(coarse, mean), []
+    information = np.einsum("gik,gij,gjk->kg", slopes, np.linalg.inv(covariance), slopes)
     for axis, at in enumerate(coarse):
-        slope = np.asarray(np.gradient(mean.reshape(*shape, -1), at, axis=axis)).reshape(len(mean), -1)
-        per_step = np.sqrt(np.einsum("gi,gij,gj->g", slope, weight, slope)).reshape(shape).max(1 - axis)
+        per_step = np.sqrt(information[axis]).reshape(len(coarse[0]), -1).max(1 - axis)
         passed = np.concatenate([[0.0], np.cumsum((per_step[1:] + per_step[:-1]) / 2 * np.diff(at))])
         passed = passed / passed[-1] + np.linspace(0, 0.5, len(at))  # some everywhere
         steps = float(np.sum((per_step[1:] + per_step[:-1]) / 2 * np.diff(at)))

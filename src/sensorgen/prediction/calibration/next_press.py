@@ -19,15 +19,7 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.calibration.fitting import (
-    Data,
-    Posterior,
-    covariances,
-    information,
-    prior,
-    readings,
-    usual_components,
-)
+from sensorgen.prediction.calibration import fitting
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, spread_at
 from sensorgen.prediction.inference import cramer_rao, whitening
 
@@ -64,7 +56,7 @@ def outlook(
     try:
         model = SpecimenModel(sensor, frequency_hz, spread_at(sensor))
         sigma = np.full(len(model.frequency_hz), noise * 1.1**0.5)
-        before = prior(model, sigma)
+        before = fitting.prior(model, sigma)
         return _errors(model, _planned(model, before, force_n), force_n, position_m), _errors(
             model, before, force_n, position_m
         )
@@ -72,7 +64,7 @@ def outlook(
         return None
 
 
-def _planned(model: SpecimenModel, before: Posterior, force_n: float) -> Posterior:
+def _planned(model: SpecimenModel, before: fitting.Posterior, force_n: float) -> fitting.Posterior:
     """Knowledge after presses up to a force, all over the strip, half of them after a higher one."""
     k: Real = np.arange(1.0, PRESSES + 1)
     length, half = model.sensor.length_m, model.sensor.tip_m / 2
@@ -80,9 +72,9 @@ def _planned(model: SpecimenModel, before: Posterior, force_n: float) -> Posteri
         force_n * (0.05 + 0.95 * k / PRESSES), half + (length - 2 * half) * (k * _GOLDEN % 1),
         np.where(k % 2 == 0, 0.3, 0.0), -0.5 + 2 * (k * _SILVER % 1),
     )  # fmt: skip
-    data = Data.unread(presses, before.noise, rest_noise=before.noise / PRESSES**0.5)
-    usual = usual_components(model)
-    known = information(model, data, before.at, usual) + before.information
+    data = fitting.Data.unread(presses, before.noise, rest_noise=before.noise / PRESSES**0.5)
+    usual = fitting.usual_components(model)
+    known = fitting.information(model, data, before.at, usual) + before.information
     scatter, wander, _ = usual.tolist()
     return replace(
         before, covariance=np.asarray(np.linalg.inv(known)), scatter=scatter, wander_c=wander, wander_r=wander,
@@ -90,10 +82,10 @@ def _planned(model: SpecimenModel, before: Posterior, force_n: float) -> Posteri
     )  # fmt: skip
 
 
-def _errors(model: SpecimenModel, known: Posterior, force_n: float, position_m: float) -> Real:
+def _errors(model: SpecimenModel, known: fitting.Posterior, force_n: float, position_m: float) -> Real:
     force = force_n * np.array([1 - _STEP, 1, 1 + _STEP])
     place = np.clip(position_m + model.sensor.length_m * np.array([-_STEP, 0, _STEP]), 0, model.sensor.length_m)
-    mean, covariance = readings(model, known, force, place)
+    mean, covariance = fitting.readings(model, known, force, place)
     at = mean.reshape(3, 3, -1)
     slopes = np.stack([(at[2, 1] - at[0, 1]) / (force[2] - force[0]), (at[1, 2] - at[1, 0]) / (place[2] - place[0])])
     by_force, by_position = slopes @ whitening(covariance[4]).T
@@ -201,13 +193,13 @@ class NextPress:
         unloading = np.maximum(2 * share[2] - 1, 0) * (1 - force / high)
         return Presses(force, near + (far - near) * share[1], unloading, hold[0] + (hold[1] - hold[0]) * share[3])
 
-    def best(self, known: Posterior) -> KnownPress:
+    def best(self, known: fitting.Posterior) -> KnownPress:
         """The most informative next press."""
         k = int(np.argmin(self.left(known, self.tried)))
         force, position, unloading, decades = (float(column[k]) for column in vars(self.tried).values())
         return KnownPress(force, position, force / (1 - unloading), 10**decades)
 
-    def left(self, known: Posterior, presses: Presses) -> Real:
+    def left(self, known: fitting.Posterior, presses: Presses) -> Real:
         """Uncertainty of the aim that each of n presses would leave, (n,); the less the better [-]."""
         c, slopes = known.covariance, self.model.slopes(known.at, presses)
         gain = slopes @ c  # (n, 2 m, p)
@@ -218,11 +210,11 @@ class NextPress:
             return np.asarray(np.linalg.slogdet((c - less)[:, which][:, :, which])[1])
         return np.asarray(np.einsum("ab,nab->n", self._weight(known), c - less))
 
-    def _weight(self, known: Posterior) -> Real:
+    def _weight(self, known: fitting.Posterior) -> Real:
         """Factor from a covariance to the mean variance of ratios anywhere, over their own."""
         slopes = self.model.slopes(known.at, self._everywhere)
         own = np.linalg.inv(self._noise(known, self._everywhere))
         return np.asarray(np.einsum("nia,nij,njb->ab", slopes, own, slopes, optimize=True) / len(slopes))
 
-    def _noise(self, known: Posterior, presses: Presses) -> Real:
-        return covariances(self.model, known.at, Data.unread(presses, self.noise), known.components)
+    def _noise(self, known: fitting.Posterior, presses: Presses) -> Real:
+        return fitting.covariances(self.model, known.at, fitting.Data.unread(presses, self.noise), known.components)

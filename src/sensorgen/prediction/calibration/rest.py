@@ -116,6 +116,45 @@ class Baseline:
         return RestChange(float(ln_cr[0]), float(ln_cr[1]), usual_c, usual_r, other)
 
 
+LOADS_N = np.array([0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0])  # that may lie on a sensor at rest
+_USUAL_N = 1.0  # standard deviation of such a load: a guess
+_BORDERS = np.arange(-4.0, 8.1, 0.25)  # of how far readings lie below that at rest, in standard deviations
+_SHARES = 0.7 ** np.arange(14)  # of the readings
+_OUTLIERS = 1e-3  # readings expected between two borders for other reasons
+
+
+def load_probabilities(below: Real, by_load: Real, loaded: float) -> Real:
+    r"""Probabilities of ``LOADS_N`` (k,) on the sensor at rest, by readings that lie below it: no force is negative.
+
+    A reading of no force lies u standard deviations below one at rest under a load. The number of such readings, n, is
+    unknown, and other small forces are evenly spread: how far readings lie below has the density
+    :math:`n \varphi(b - u) + \lambda \Phi(u - b)`, so that readings without force alone show no load.
+
+    Parameters
+    ----------
+    below : (n,) array
+        How far readings lie below the one at rest, in standard deviations; nan where unknown.
+    by_load : (k,) array
+        How far one of no force does if that at rest is under each of ``LOADS_N``.
+    loaded : float
+        Probability of a load before.
+    """
+    from scipy.special import ndtr
+
+    middle, width = (_BORDERS[1:] + _BORDERS[:-1]) / 2, np.diff(_BORDERS)
+    count, _ = np.histogram(np.minimum(below[np.isfinite(below)], middle[-1]), _BORDERS)
+    away = middle - np.minimum(by_load, middle[-1])[:, None]
+    presses, zeros = width * ndtr(-away), width * np.exp(-(away**2) / 2) / np.sqrt(2 * np.pi)
+    shares = count.sum() * np.append(0.0, _SHARES)[:, None, None]
+    expected = shares[:, None] * zeros + shares[1:] * presses + _OUTLIERS
+    ln = (count * np.log(expected) - expected).sum(-1)
+    none_or_some = np.where(shares, 1 / len(_SHARES), 1.0)  # as probable
+    evidence = (none_or_some * np.exp(ln - ln.max())).sum((0, 1))
+    before = np.exp(-((LOADS_N[1:] / _USUAL_N) ** 2) / 2) * np.gradient(LOADS_N[1:])
+    chance = evidence * np.append(1 - loaded, loaded * before / before.sum())
+    return np.asarray(chance / chance.sum())
+
+
 LATEST = 64  # readings at rest that count, of those since the last press
 FEWEST = 8  # differences of successive ones from which noise can be told
 _MOST_STEPS = 4096

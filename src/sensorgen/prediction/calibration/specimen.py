@@ -22,7 +22,7 @@ from sensorgen.prediction.inverse.forward import Forward, tones
 from sensorgen.prediction.query import TONES_HZ, Query, Tip
 from sensorgen.prediction.sensor_model import SensorModel, sensor_model
 
-FORCES_N = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)  # at which the law of compression may differ from the predicted one
+FORCES_N = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)  # on a whole tip, where the law of compression may be another
 _BENDS = 4  # modes of the resistivity's profile, half waves along the strip
 _PIECES = 3  # on either side of the tip
 _FAR_N = 1e4  # more than any press
@@ -262,7 +262,8 @@ class SpecimenModel:
         share, _ = sensor.compression.capacitive_strain(np.minimum(stress, self.most_pa))
         first = self._at[f"rise at {FORCES_N[0]:g} N"]
         knots = self.spread.law_shape * (at[..., first : first + len(FORCES_N)] @ self._shapes.T)
-        ln_rise = rise + np.matmul(_shares(np.log(force)), knots[..., None])[..., 0]
+        shares = _shares(np.log(force * sensor.tip_m / length_m))
+        ln_rise = rise + np.matmul(shares, knots[..., None])[..., 0]
         for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
             ln_rise = ln_rise + value[name] * np.nan_to_num(course)
         beyond = np.maximum(stress / self.most_pa, 1.0)
@@ -318,8 +319,10 @@ class SpecimenModel:
 
         Parameters of the rise alone have a part in the derivative by ln of the rise.
         """
-        ln = np.log(np.maximum(presses.force_n + self.value("force offset", at), _NOTHING_N))
-        by = _shares(ln) @ self.law_weights()
+        position = np.clip(presses.position_m + self.value("position offset", at), 0, self.sensor.length_m)
+        whole = self.sensor.tip_m / self.sensor.patch(position).length_m
+        force = np.maximum(presses.force_n + self.value("force offset", at), _NOTHING_N)
+        by = _shares(np.log(force * whole)) @ self.law_weights()
         for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
             by[:, self._at[name]] = self.value(name, at) * np.nan_to_num(course)
         derivatives = self.scatters(at, presses, [0]) * by[:, None]

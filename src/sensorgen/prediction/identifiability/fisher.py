@@ -5,6 +5,7 @@ independent. Divided by Z a reading is then ln Z with noise ``noise`` in both pa
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from typing import NamedTuple
 
@@ -13,17 +14,10 @@ from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import OutOfRange
+from sensorgen.models import refusal
 from sensorgen.models.sensor import Response, Sensor
-from sensorgen.prediction.identifiability.results import (
-    FORCE_SHARE,
-    GUESS,
-    AdvisedFrequencies,
-    FrequencyChoice,
-    StandardErrors,
-    finite,
-    metres,
-    newtons,
-)
+from sensorgen.prediction.identifiability import results
+from sensorgen.prediction.identifiability.results import GUESS, finite, metres, newtons
 from sensorgen.prediction.inference import cramer_rao, orthogonal
 
 
@@ -164,23 +158,16 @@ def undefined(setup: Setup, of: Slopes) -> str:
 
 def bearable(sensor: Sensor, force_n: Real, position_m: Real) -> Mask:
     """Where the law of compression is defined, in the broadcast shape of forces [N] and positions [m]."""
-
-    def defined(stress_pa: Real) -> bool:
-        try:
-            sensor.compression.capacitive_strain(stress_pa)
-        except OutOfRange:
-            return False
-        return True
-
     stress = sensor.stress_pa(force_n, position_m)
-    if defined(stress):
+    refused = partial(refusal, OutOfRange, sensor.compression.capacitive_strain)
+    if refused(stress) is None:
         return np.ones(stress.shape, bool)
-    return np.array([defined(np.asarray(one)) for one in stress.ravel()]).reshape(stress.shape)
+    return np.array([refused(np.asarray(one)) is None for one in stress.ravel()]).reshape(stress.shape)
 
 
-def standard_errors(limits: LeastErrors) -> StandardErrors:
+def standard_errors(limits: LeastErrors) -> results.StandardErrors:
     """Bounds of one press, None where they are undefined."""
-    return StandardErrors(
+    return results.StandardErrors(
         sigma_force_n=finite(limits.force_n),
         sigma_position_m=finite(limits.position_m),
         correlation=finite(limits.correlation),
@@ -218,9 +205,9 @@ class Required:
             worse = np.maximum(bounds.force_n / self.force_n, bounds.position_m / self.position_m)
         return np.where(np.isnan(worse), np.inf, worse)
 
-    def errors(self) -> StandardErrors:
+    def errors(self) -> results.StandardErrors:
         """The required standard errors as a result."""
-        return StandardErrors(sigma_force_n=self.force_n, sigma_position_m=self.position_m)
+        return results.StandardErrors(sigma_force_n=self.force_n, sigma_position_m=self.position_m)
 
     def force(self, sigma_n: float) -> str:
         """Verdict on sensing force at a standard error [N]: yes, roughly or no."""
@@ -234,7 +221,7 @@ class Required:
 def required(setup: Setup) -> Required:
     """Requirements of a press: a tenth of its force, and one length of the tip."""
     force, sensor = abs(setup.force_n), setup.sensor
-    return Required(FORCE_SHARE * force, sensor.tip_m, GUESS * force, GUESS * sensor.length_m)
+    return Required(results.FORCE_SHARE * force, sensor.tip_m, GUESS * force, GUESS * sensor.length_m)
 
 
 def _grade(sigma: float, serves: float, guess: float) -> str:
@@ -277,7 +264,7 @@ PER_DECADE = 20  # of the grid of advised frequencies
 BELOW, ABOVE = 100.0, 10.0  # how far the grid reaches from the corner, as factors
 
 
-def best(setup: Setup, of: Slopes, required: Required) -> tuple[FrequencyChoice, ...]:
+def best(setup: Setup, of: Slopes, required: Required) -> tuple[results.FrequencyChoice, ...]:
     """The best one, two and three of the given frequencies, all combinations tried.
 
     Parameters
@@ -296,14 +283,14 @@ def best(setup: Setup, of: Slopes, required: Required) -> tuple[FrequencyChoice,
     return tuple(_best(frequency, among, size, setup.noise, required) for size in sizes)
 
 
-def advised(setup: Setup, required: Required) -> AdvisedFrequencies:
+def advised(setup: Setup, required: Required) -> results.AdvisedFrequencies:
     """The best single frequency and the best pair on a grid about the corner, up to the instrument's limit."""
     corner = _corner_hz(setup)
     low, high = corner / BELOW, min(corner * ABOVE, setup.highest_hz)
     grid = np.geomspace(low, high, round(PER_DECADE * float(np.log10(high / low))) + 1)
     on_grid = slopes(setup.sensor, grid, setup.force_n, setup.position_m)
     single, pair = (_best(grid, on_grid, size, setup.noise, required) for size in (1, 2))
-    return AdvisedFrequencies(float(grid[0]), float(grid[-1]), single, pair)
+    return results.AdvisedFrequencies(float(grid[0]), float(grid[-1]), single, pair)
 
 
 def spread(setup: Setup) -> tuple[float, ...]:
@@ -318,15 +305,15 @@ def _corner_hz(setup: Setup) -> float:
     return min(setup.sensor.corner_frequency_hz(), setup.highest_hz)
 
 
-def _best(frequency: Real, of: Slopes, size: int, noise: float, required: Required) -> FrequencyChoice:
+def _best(frequency: Real, of: Slopes, size: int, noise: float, required: Required) -> results.FrequencyChoice:
     """The combination of ``size`` frequencies with the smallest shortfall."""
     chosen = np.array(list(combinations(range(len(frequency)), size)))
     limits = bounds(Slopes(*(slope[chosen] for slope in of)), noise)
     short = required.shortfall(limits)
     k = int(np.argmin(short))
     if np.isinf(short[k]):
-        return FrequencyChoice(sigma_force_n=None, sigma_position_m=None)
-    return FrequencyChoice(
+        return results.FrequencyChoice(sigma_force_n=None, sigma_position_m=None)
+    return results.FrequencyChoice(
         frequency_hz=tuple(frequency[chosen[k]].tolist()),
         sigma_force_n=float(limits.force_n[k]),
         sigma_position_m=float(limits.position_m[k]),

@@ -17,13 +17,7 @@ from sensorgen.models.compression import Plate
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.identifiability import fisher, results
 from sensorgen.prediction.identifiability.fisher import LeastErrors, Required, Setup, spread, standard_errors
-from sensorgen.prediction.identifiability.results import (
-    ChangeResult,
-    Identifiability,
-    StandardErrors,
-    cartesian,
-    finite,
-)
+from sensorgen.prediction.identifiability.results import cartesian, finite
 from sensorgen.prediction.query import FORCE_N, NOISE
 
 SHOWN = 3
@@ -67,12 +61,12 @@ class Tried:
     bounds: LeastErrors
     shortfall: float
 
-    def result(self) -> ChangeResult:
+    def result(self) -> results.ChangeResult:
         """As a result, with the frequencies named."""
         low, high = (
             f"{np.round(f / 1e3, 3):.4g} kHz" for f in (min(self.setup.frequency_hz), max(self.setup.frequency_hz))
         )
-        return ChangeResult(
+        return results.ChangeResult(
             **vars(standard_errors(self.bounds)),
             kind=self.change.kind,
             change=self.change.name.format(lowest=low, highest=high, count=len(self.setup.frequency_hz)),
@@ -244,7 +238,7 @@ def identify(
     highest_hz: float = HIGHEST_HZ,
     stiffest: Sensor | None = None,
     assumed: str = "",
-) -> Identifiability:
+) -> results.Identifiability:
     """Cramer-Rao bounds of force and position, which frequencies carry the information, and what would improve them.
 
     Parameters
@@ -284,7 +278,7 @@ def identify(
     combined = together(setup, helpful) if helpful else None
     stiff = setup.on(stiffest).bounds() if stiffest else None
     calibrated, uncalibrated = _on_a_bench(setup)
-    return Identifiability(
+    return results.Identifiability(
         **vars(fisher.standard_errors(limits)), noise=noise, press=_press(setup),
         corner_frequency_hz=sensor.corner_frequency_hz() if sensor.resistance_ohm() else None,
         required=need.errors(), reason=reason, assumed=assumed or None,
@@ -309,7 +303,7 @@ def _press(setup: Setup) -> results.ReferencePress:
     return results.ReferencePress(setup.force_n, setup.position_m, sensor.tip_m, float(stress), strain)
 
 
-def _on_a_bench(setup: Setup) -> tuple[StandardErrors, StandardErrors] | tuple[None, None]:
+def _on_a_bench(setup: Setup) -> tuple[results.StandardErrors, results.StandardErrors] | tuple[None, None]:
     """Errors of a specimen, with a calibration and without."""
     from sensorgen.prediction.calibration.next_press import outlook
 
@@ -317,7 +311,7 @@ def _on_a_bench(setup: Setup) -> tuple[StandardErrors, StandardErrors] | tuple[N
     if errors is None:
         return None, None
     calibrated, uncalibrated = (
-        StandardErrors(sigma_force_n=_rounded(force), sigma_position_m=_rounded(position))
+        results.StandardErrors(sigma_force_n=_rounded(force), sigma_position_m=_rounded(position))
         for force, position in np.array(errors).tolist()
     )
     return calibrated, uncalibrated

@@ -448,17 +448,6 @@ class Estimator:
         )
 
 
-def estimate(
-    sensor: Sensor,
-    frequency_hz: ArrayLike,
-    impedance_ohm: ArrayLike,
-    noise: ArrayLike = NOISE,
-    prior: Prior | None = None,
-) -> Estimates:
-    """Presses behind readings (n, n_tones) [ohm]; parameters and errors as of :class:`Estimator`."""
-    return Estimator(sensor, frequency_hz, noise, prior).batch(impedance_ohm)
-
-
 def _within_noise(best: LocalFit, rows: Index, second: LocalFit) -> _Pair:
     """Those second presses that are presses of their own and explain the reading as well."""
     first = best.rows(rows)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.models import line
+from sensorgen.models import line, refusal
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.inference import Index, parts
 from sensorgen.solvers.line.inputs import far_load
@@ -83,11 +83,8 @@ class Forward:
         return low * (1 - 1e-6)
 
     def _bears(self, force_n: float) -> bool:
-        try:
-            self.log_impedance(np.full(2, force_n), np.array([0.0, self.sensor.length_m]))
-        except OutOfRange:
-            return False
-        return True
+        ends = np.full(2, force_n), np.array([0.0, self.sensor.length_m])
+        return refusal(OutOfRange, self.log_impedance, *ends) is None
 
 
 def tones(frequency_hz: ArrayLike) -> Real:

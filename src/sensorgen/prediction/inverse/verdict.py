@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Mask, Real
+from sensorgen.core.document import csv_row
 from sensorgen.prediction.inference import LocalFit
 
 
@@ -63,26 +64,14 @@ def header(given: Sequence[str], columns: Sequence[str]) -> str:
     >>> header(["time_s", "force_n"], ["force_n", "position_mm"])
     'time_s,force_n_given,force_n,position_mm\n'
     """
-    return _row([*(_cell(f"{name}_given" if name in columns else name) for name in given), *columns])
+    return csv_row([*(f"{name}_given" if name in columns else name for name in given), *columns])
 
 
 def rows(given: Sequence[Sequence[str]], numbers: Real, tones: NDArray[np.intp], words: NDArray[Any]) -> str:
     """Rows of a CSV file: the input's other cells, numbers (n, k) that are blank where there are none, and statuses."""
-    ends = zip(given, numbers.tolist(), tones.tolist(), words.tolist(), strict=True)
-    return "".join(_row([*map(_cell, own), *map(_number, row), str(n), word]) for own, row, n, word in ends)
-
-
-def _number(value: float) -> str:
-    return f"{value:.9g}" if abs(value) < np.inf else ""
-
-
-def _cell(text: str) -> str:
-    """A cell as CSV; quoted where it would come apart."""
-    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
-
-
-def _row(cells: Sequence[str]) -> str:
-    return ",".join(cells) + "\n"
+    cells = ((f"{value:.9g}" if abs(value) < np.inf else "" for value in row) for row in numbers.tolist())
+    ends = zip(given, cells, map(str, tones.tolist()), words.tolist(), strict=True)
+    return "".join(csv_row([*own, *row, *last]) for own, row, *last in ends)
 
 
 PAIR = 9.21  # 99 % of chi-squared with two degrees of freedom: force and position

@@ -215,7 +215,7 @@ class Tangent:
     inverse: Real
 
     def condensed(self, residual: Real, mu_pa: Real) -> Unbalanced:
-        """What a residual (m, k + i) leaves, of the tangent's own state or one nearby; ``mu_pa`` (m,) [Pa]."""
+        """Remainder of a residual (m, k + i), of the tangent's own state or one nearby; ``mu_pa`` (m,) [Pa]."""
         outer, inner = self.slope.shape[2], self.slope.shape[1]
         inside = residual[:, outer:, None]
         force = residual[:, :outer] - np.matmul(self.slope.transpose(0, 2, 1), inside)[..., 0]

@@ -222,7 +222,7 @@ class Problem:
         return None
 
     def _descended(self, state: State, by: Stiffness, enough: float, *, own: bool) -> tuple[State | None, bool]:
-        """As far as one stiffness serves, and whether that is the balance; None where no step is possible.
+        """State as far as one stiffness serves, and whether it is balanced; None where no step is possible.
 
         A state's ``own`` stiffness serves at least once; that of another one, while each step leaves much less.
         """

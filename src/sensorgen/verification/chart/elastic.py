@@ -22,8 +22,8 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.models import compression, press2d, press3d, press_round, pressure, springs
 from sensorgen.models.compression import Plate
-from sensorgen.models.press2d import Elastic, Fineness
-from sensorgen.models.press3d import BoundaryConditions, BrickCounts, Pressed
+from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness, Pressed
+from sensorgen.models.press3d import BrickCounts
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Body, Prism, Scene, box
 from sensorgen.solvers.contact.cell import ContactCell

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from sensorgen.core.units import M_PER_MM
 from sensorgen.models import conduction, line, sheet, stack, traxels
-from sensorgen.models.sheet import Sheet
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.network import StraightLines
+from sensorgen.solvers.sheet.parts import Sheet
 from sensorgen.verification import line_models
 from sensorgen.verification.chart.measured import DIGITS, ChartPoint, Level, SceneKind, climbed
 

@@ -11,7 +11,7 @@ from sensorgen.asprinted import agreement
 from sensorgen.asprinted import printed as asprinted
 from sensorgen.checks.review import Review, Step
 from sensorgen.core import files as store
-from sensorgen.core.document import Part
+from sensorgen.core.document import Part, to_json
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, Unprintable
 from sensorgen.core.findings import headline
 from sensorgen.core.parallel import remembered
@@ -93,7 +93,7 @@ class Batch:
 
     def to_json(self) -> str:
         """The folder, then the record."""
-        return f'{{\n  "folder": {json.dumps(str(self.folder))},{self.record.to_json()[1:]}'
+        return f'{{\n  "folder": {json.dumps(str(self.folder))},{to_json(self.record)[1:]}'
 
     def document(self) -> Iterator[Part]:
         """The record, the numbers of findings, and the folder."""
@@ -210,7 +210,7 @@ def make(
         }
         step("record")
         batch = _record(placed, predicted, sliced, stage).sealed()
-        store.write(stage, {record.RECORD: batch.to_json().encode()})
+        store.write(stage, {record.RECORD: to_json(batch).encode()})
         store.publish(stage, folder, record.RECORD)
     step("done")
     return Batch(folder, batch, {placed.designs[key].name: review for key, review in reviews.items()})

@@ -3,11 +3,11 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any
 
 from sensorgen.checks.volumes import LayerVolume
-from sensorgen.core.document import Column, Part, Table
+from sensorgen.core.display import Boundless
+from sensorgen.core.document import Column, Part, Table, to_json
 from sensorgen.core.errors import MissingValue
 from sensorgen.core.findings import Finding
 from sensorgen.core.units import si
@@ -17,9 +17,6 @@ from sensorgen.prediction.results import Prediction
 from sensorgen.workflows.batch.layout import Plate, Rect
 from sensorgen.workflows.batch.plan import Bake, BatchPlan, Filament, Layout, PrintPiece
 from sensorgen.workflows.sealed import seal
-
-if TYPE_CHECKING:
-    from pydantic import TypeAdapter
 
 RECORD = "batch.json"
 _COLUMNS = (
@@ -157,7 +154,7 @@ class SlicedPlate(Checked):
 
 
 @dataclass(frozen=True)
-class BatchRecord:
+class BatchRecord(Boundless):
     """The record of a batch.
 
     Attributes
@@ -192,8 +189,6 @@ class BatchRecord:
         Of all the rest of the record, so that a change by hand shows.
     """
 
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
-
     batch: str
     iteration: int
     seed: int
@@ -212,13 +207,9 @@ class BatchRecord:
     files: dict[str, str]
     sha256: str = ""
 
-    def to_json(self) -> str:
-        """As in ``batch.json``."""
-        return _adapter().dump_json(self, indent=2).decode() + "\n"
-
     def sealed(self) -> "BatchRecord":
         """The record with its own SHA-256."""
-        return replace(self, sha256=seal(json.loads(self.to_json())))
+        return replace(self, sha256=seal(json.loads(to_json(self))))
 
     def document(self) -> Iterator[Part]:
         """Specimens, checklist, and what the slicers made."""
@@ -240,13 +231,6 @@ def _expected(prediction: Prediction) -> tuple[float | None, float | None]:
     if prediction.capacitance is None:
         return None, None
     return sum(r.value for r in prediction.resistance.values()), prediction.capacitance.value
-
-
-@cache
-def _adapter() -> "TypeAdapter[BatchRecord]":
-    from pydantic import TypeAdapter
-
-    return TypeAdapter(BatchRecord)
 
 
 def specimens(pieces: Sequence[PrintPiece], plate: Plate) -> dict[str, PlateSpecimen]:

@@ -11,19 +11,8 @@ from typing import TYPE_CHECKING
 import shapely
 from shapely import affinity
 
-from sensorgen.analysis.characterise.catalogue import (
-    ELECTRODE_MM,
-    LADDER_MM,
-    PAD_DIAMETER_MM,
-    PAD_MM,
-    PAD_PITCH_MM,
-    PADS_IN_ROW,
-    PLATE_RADIUS_MM,
-    STRIP_MM,
-    UPPER_MM,
-    Coupon,
-    film_radius_mm,
-)
+from sensorgen.analysis.characterise import catalogue as drawn
+from sensorgen.analysis.characterise.catalogue import Coupon
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design
 from sensorgen.design.printer import tower
@@ -75,7 +64,7 @@ def bodies(coupon: Coupon, conductor: str, dielectric: str) -> tuple[Body, ...]:
     if coupon.kind == "bar":
         return (Body("bar", conductor, (_bar(coupon),)),)
     if coupon.kind == "ladder":
-        length = sum(LADDER_MM) + STRIP_MM * (len(LADDER_MM) + 1)
+        length = sum(drawn.LADDER_MM) + drawn.STRIP_MM * (len(drawn.LADDER_MM) + 1)
         return (
             Body("ladder", conductor, (box(0, length, 0, coupon.drawn("width_mm"), 0, coupon.drawn("height_mm")),)),
         )
@@ -84,8 +73,10 @@ def bodies(coupon: Coupon, conductor: str, dielectric: str) -> tuple[Body, ...]:
     if coupon.kind == "pads":
         pads = []
         for k in range(len(coupon.readings)):
-            row, column = divmod(k, PADS_IN_ROW)
-            pad = affinity.translate(_circle(PAD_DIAMETER_MM / 2), PAD_PITCH_MM * column, PAD_PITCH_MM * row)
+            row, column = divmod(k, drawn.PADS_IN_ROW)
+            pad = affinity.translate(
+                _circle(drawn.PAD_DIAMETER_MM / 2), drawn.PAD_PITCH_MM * column, drawn.PAD_PITCH_MM * row
+            )
             pads.append(_prism(pad, 0.0, coupon.drawn(f"height_{k + 1}_mm")))
         return (Body("pads", coupon.material, tuple(pads)),)
     disc = _circle(coupon.drawn("diameter_mm") / 2)
@@ -105,17 +96,18 @@ def _plates(coupon: Coupon, conductor: str, dielectric: str) -> tuple[Body, ...]
     """Films side by side on one lower electrode with a pad, each under a round electrode."""
     count = len(coupon.readings)
     films = [coupon.drawn(f"film_{k}_on_electrode_mm") for k in range(1, count + 1)]
-    rims = [film_radius_mm(top - ELECTRODE_MM) for top in films]
-    middles = [PAD_MM + 2 * sum(rims[:k]) + rims[k] for k in range(count)]
-    track = shapely.box(0, -PAD_MM / 2, middles[-1], PAD_MM / 2)
+    rims = [drawn.film_radius_mm(top - drawn.ELECTRODE_MM) for top in films]
+    middles = [drawn.PAD_MM + 2 * sum(rims[:k]) + rims[k] for k in range(count)]
+    track = shapely.box(0, -drawn.PAD_MM / 2, middles[-1], drawn.PAD_MM / 2)
     lower = shapely.union_all([track, *(_circle(rim, x) for rim, x in zip(rims, middles, strict=True))])
     return (
-        Body("lower", conductor, (_prism(lower, 0.0, ELECTRODE_MM),)),
+        Body("lower", conductor, (_prism(lower, 0.0, drawn.ELECTRODE_MM),)),
         Body("film", dielectric, tuple(
-            _prism(_circle(rim, x), ELECTRODE_MM, top) for rim, x, top in zip(rims, middles, films, strict=True)
+            _prism(_circle(rim, x), drawn.ELECTRODE_MM, top) for rim, x, top in zip(rims, middles, films, strict=True)
         )),
         Body("upper", conductor, tuple(
-            _prism(_circle(PLATE_RADIUS_MM, x), top, top + UPPER_MM) for x, top in zip(middles, films, strict=True)
+            _prism(_circle(drawn.PLATE_RADIUS_MM, x), top, top + drawn.UPPER_MM)
+            for x, top in zip(middles, films, strict=True)
         )),
     )  # fmt: skip
 
@@ -214,9 +206,9 @@ def _marks(coupon: Coupon, pieces: Sequence[Body], shift: tuple[float, float]) -
     if coupon.kind == "ladder":
         high = coupon.drawn("width_mm")
         dashed = {"fill": "none", "stroke": "#b00", "stroke_dasharray": "1 .5"}
-        for k in range(len(LADDER_MM) + 1):
-            start = sum(LADDER_MM[:k]) + STRIP_MM * k
-            yield paper.box("", start + shift[0], shift[1] - high, STRIP_MM, high, **dashed)
+        for k in range(len(drawn.LADDER_MM) + 1):
+            start = sum(drawn.LADDER_MM[:k]) + drawn.STRIP_MM * k
+            yield paper.box("", start + shift[0], shift[1] - high, drawn.STRIP_MM, high, **dashed)
     elif coupon.kind in ("plate", "pads"):
         for k, piece in enumerate(pieces[-1].pieces, 1):
             u, v = (sum(piece.span(axis)) / 2 for axis in "xy")

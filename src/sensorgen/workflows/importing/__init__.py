@@ -14,7 +14,7 @@ import yaml
 
 from sensorgen.core import files
 from sensorgen.core.arrays import Real
-from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.document import Column, Facts, Part, Table, apart
 from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding, listed
 from sensorgen.design import design as designs
@@ -158,8 +158,8 @@ def _terminals(
     every = _touching(bodies)
     if len(every) == 1 and len(bodies) > 1:  # its lowest and its highest body are shorted
         ends = {**dict.fromkeys(every[0], ""), bodies[0].name: "bottom", bodies[-1].name: "top", **given}
-        return ends, tuple(_shorts(every, ends))
-    ends = _by_height(every, {body.name: float(body.box_mm[:, 2].mean()) for body in bodies}, given)
+    else:
+        ends = _by_height(every, {body.name: float(body.box_mm[:, 2].mean()) for body in bodies}, given)
     return ends, tuple(_shorts(every, ends))
 
 
@@ -282,11 +282,7 @@ class BodyListing:
     def document(self) -> Iterator[Part]:
         """All of it."""
         yield Table.of("bodies", "", self.bodies)
-        if self.findings:
-            yield ""
-            yield from listed(self.findings)
-        yield ""
-        yield f"To import it: {self.words()}"
+        yield from apart(listed(self.findings), [f"To import it: {self.words()}"])
 
     def words(self) -> str:
         """Words to type to import it."""
@@ -333,10 +329,14 @@ class Imported:
         """Files written, and what applies to them."""
         size = " x ".join(f"{edge:g}" for edge in self.size_mm)
         moved = ", ".join(f"{way:g}" for way in self.moved_mm)
+        reasons: dict[str, list[str]] = {}
+        for name, reason in self.models.items():
+            reasons.setdefault(reason, []).append(name)
+        why = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
         rows = [
             ("size", f"{size} mm" + (f"; moved by {moved} mm, its corner to 0, 0, 0" if any(self.moved_mm) else "")),
             *self.bodies.items(),
-            ("capacitance as drawn", self._models_as_drawn()),
+            ("capacitance as drawn", (", ".join(reasons.get("", ())) or f"no model applies, only as printed ({why})")),
             ("written", f"{self.design} and {self.geometry}"),
             (
                 "next",
@@ -346,17 +346,7 @@ class Imported:
             ),
         ]
         yield Facts(tuple(rows))
-        if self.findings:
-            yield ""
-            yield from listed(self.findings)
-
-    def _models_as_drawn(self) -> str:
-        """Models that apply to the drawing, or why none does."""
-        reasons: dict[str, list[str]] = {}
-        for name, reason in self.models.items():
-            reasons.setdefault(reason, []).append(name)
-        why = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
-        return ", ".join(reasons.get("", ())) or f"no model applies, only as printed ({why})"
+        yield from apart(listed(self.findings))
 
 
 def write(

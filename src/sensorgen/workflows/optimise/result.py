@@ -3,10 +3,9 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from math import inf
-from typing import ClassVar
 
 from sensorgen.core.bounds import Bounds
-from sensorgen.core.display import Displayed
+from sensorgen.core.display import Boundless, Displayed
 from sensorgen.core.document import Cell, Column, Part, Table, comma_separated, shown
 from sensorgen.core.findings import Verdict
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
@@ -124,7 +123,7 @@ class Recommended:
 
 
 @dataclass(frozen=True)
-class Optimised(Displayed):
+class Optimised(Boundless, Displayed):
     """The answer to a target.
 
     Attributes
@@ -154,8 +153,6 @@ class Optimised(Displayed):
     whole : int
         Designs of the whole space where only a sample was tried, else 0 [-].
     """
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
     name: str
     size: int

@@ -254,7 +254,10 @@ def _built(one: Recommended, target: Target, design: Design, out: Path, sliced: 
         built = build(design, out, cad=False)
     except Unprintable as error:
         return replace(one, verdict="CHANGE", slicer=str(error), sliced=None)
-    store.replace(out / f"{design.name}.yaml", _yaml(design))
+    import yaml
+
+    data = design.model_dump(mode="json", exclude_defaults=True)
+    store.replace(out / f"{design.name}.yaml", str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True)).encode())
     one = replace(one, folder=str(folder), verdict=built.verdict)
     if one.sliced is None:
         return one
@@ -275,10 +278,3 @@ def _with_gcode(one: Recommended, design: Design, out: Path) -> Recommended:
     except SensorgenError as error:
         return replace(one, slicer=str(error))
     return replace(one, sliced={}, slicer=f"PrusaSlicer {slicer.version}")
-
-
-def _yaml(design: Design) -> bytes:
-    import yaml
-
-    data = design.model_dump(mode="json", exclude_defaults=True)
-    return str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True)).encode()

@@ -9,6 +9,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design.tip import EVEN, Tip
 from sensorgen.measure.signal import lowpass
+from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction.bodies import drawn
@@ -32,7 +33,7 @@ def _pressed(
 ) -> compressed.CompressionResult:
     """A cell under 100 kPa, of the cache where it was solved before."""
     design = designs.make({"shape": shape, "parameters": parameters})
-    boundary, tip = compressed.BoundaryConditions(base=base, period=period), Tip(block=EVEN)
+    boundary, tip = BoundaryConditions(base=base, period=period), Tip(block=EVEN)
     question = compressed.PressQuestion((0.0, _KPA), boundary, sides="symmetric", tip=tip)
     curve = compressed.answer(drawn(design), question)
     if curve.faults or None in curve.displacement_um:
