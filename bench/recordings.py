@@ -22,7 +22,7 @@ import made  # noqa: E402 - the truth is made as for the tests
 
 from sensorgen.analysis.plots import recordings as plots  # noqa: E402
 from sensorgen.analysis.plots import static  # noqa: E402
-from sensorgen.measure.recording import joined, read, rig  # noqa: E402
+from sensorgen.measure.recording import joined, rig  # noqa: E402
 from sensorgen.measure.signal import drift, lowpass, presses, waveform  # noqa: E402
 from sensorgen.measure.signal.run import of_presses, processed  # noqa: E402
 from sensorgen.models.sensor import Sensor  # noqa: E402
@@ -35,9 +35,9 @@ NOISE, RATE = 1e-3, 140.0
 READ = """
 import re, sys, time
 from pathlib import Path
-from sensorgen.measure.recording import read
+from sensorgen.measure.recording import parts
 start = time.process_time()
-found = read(sys.argv[1])
+found, *_ = next(parts(sys.argv[1]))
 peak = re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1]
 print(time.process_time() - start, int(peak) / 1024, len(found.time_s))
 """
@@ -103,7 +103,7 @@ def joined_run(folder, plan, offset_s, skew, **how):
     run = made.run(plan, RATE, NOISE, **how)
     sio.savemat(folder / "run.mat", made.tree([run.impedance_ohm], [run.time_s], made.stamps(run.time_s)))
     log = rig(made.write_rig(folder / "rig.csv", made.rig_rows(plan, offset_s, skew, ramp_s=how.get("ramp_s", 0.2))))
-    return joined(read(folder / "run.mat"), log), run
+    return joined(made.read(folder / "run.mat"), log), run
 
 
 def filter_table():

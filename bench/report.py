@@ -13,7 +13,7 @@ sys.path[:0] = [str(Path(__file__).parents[1] / "tests" / name) for name in ("re
 
 import bench_files  # noqa: E402 - it is among the tests
 
-from sensorgen.analysis.report import report, written  # noqa: E402
+from sensorgen.analysis.report import pieces, report  # noqa: E402
 from sensorgen.design.specimen_name import design_of, parse  # noqa: E402
 from sensorgen.measure.log import Log, bench, notes  # noqa: E402
 
@@ -39,7 +39,7 @@ def main() -> None:
         start, wall = time.process_time(), time.perf_counter()
         made = report(log, 23)
         middle = time.process_time()
-        page = written(made, "html")
+        page = "".join(pieces(made, "html"))
         end = time.process_time()
         rows = next(t for t in made.tables if t.key == "recordings").rows
         print(f"samples: {rows[0][4]}, presses: {rows[0][8]}")

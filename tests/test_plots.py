@@ -5,6 +5,7 @@ import gzip
 import json
 import re
 import struct
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -29,7 +30,7 @@ from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
-from sensorgen.models.sensor import Sensor
+from sensorgen.models.sensor import Response, Sensor
 
 PLATE = {
     "length_m": 0.1,
@@ -100,11 +101,9 @@ def test_a_map_that_folds_and_one_that_does_not(answer):
     assert not answer.folds().any()
     x = np.linspace(-1, 1, 21)
     z = np.broadcast_to(x**2 + 0j, (1, 2, 21))
-    bent = type(answer)(
-        np.array([1.0]), np.array([1.0, 2.0]), x, z, np.full((1, 2, 21), 1j), np.broadcast_to(2 * x + 0j, (1, 2, 21)),
-        10.0, 100.0,
-    )  # fmt: skip
-    shifted = type(answer)(**{**vars(bent), "by_position_ohm_per_mm": bent.by_position_ohm_per_mm + 0.05})
+    slopes = Response(z, np.full((1, 2, 21), 1j), np.broadcast_to(2 * x + 0j, (1, 2, 21)))
+    bent = type(answer)(np.array([1.0]), np.array([1.0, 2.0]), x, slopes, answer.sensor)
+    shifted = replace(bent, response=slopes._replace(by_position_ohm_per_m=slopes.by_position_ohm_per_m + 0.05))
     assert not shifted.folds()[:, :, :9].any()
     assert shifted.folds()[0, :, 9].all()
     assert shifted.folds().sum() == 2

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from sensorgen.measure.recording import read, rig
+from sensorgen.measure.recording import rig
 
 
 def test_a_plan_as_csv_stays_on_the_sensor(run):
@@ -124,7 +124,7 @@ def test_a_recording_of_the_log_by_its_number_with_tables_and_pictures(run, file
     assert said.out.splitlines()[-6:] == ["p.csv", "f.csv", *pictures]
     assert all((tmp_path / name).is_file() for name in pictures)
     assert (tmp_path / "out" / "run.html").stat().st_size > 10_000
-    filtered = read(tmp_path / "f.csv")
+    filtered = made.read(tmp_path / "f.csv")
     assert filtered.tones_hz.tolist() == made.TONES_HZ.tolist()
     assert filtered.source.rate_hz == pytest.approx(70, rel=1e-3)
     back = run("invert", "tri", "--perfect", "p.csv")

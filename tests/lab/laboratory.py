@@ -6,6 +6,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
+from sensorgen.core.records import checked
 from sensorgen.design.design import make
 from sensorgen.measure.lab import catalogue, experiment, run
 from sensorgen.measure.lab.devices import SimulatedClock
@@ -33,7 +34,7 @@ def specimen() -> PressedSpecimen:
 def asked(**changes: Any) -> experiment.Experiment:
     """A short experiment."""
     quick = {"speed_mm_s": 100.0, "landing_mm_s": 20.0, "travel_mm_s": 100.0}
-    return experiment.parse({"specimen": "24 SX60", "plan": PLAN, "approach": quick} | changes)
+    return checked(experiment.Experiment, {"specimen": "24 SX60", "plan": PLAN, "approach": quick} | changes)
 
 
 class Watched(FaultSchedule):

@@ -7,6 +7,7 @@ import pytest
 
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import SensorgenError
+from sensorgen.core.records import checked
 from sensorgen.measure.lab import experiment, run
 from sensorgen.measure.signal.presses import GUARD_S, WINDOW_S
 
@@ -14,7 +15,7 @@ RANDOM = {"random": {"presses": 40, "seed": 3}}
 
 
 def made(**changes):
-    return experiment.parse({"specimen": "24 triX .2mm", "plan": [RANDOM]} | changes)
+    return checked(experiment.Experiment, {"specimen": "24 triX .2mm", "plan": [RANDOM]} | changes)
 
 
 def test_the_template_passes_its_own_check(tmp_path, monkeypatch):
@@ -115,4 +116,4 @@ def test_the_schema_has_all_keys():
 
 def test_numbers_are_read_as_yaml_writes_them():
     data = yamlfile.parse("specimen: 24 triX .2mm\nplan: [{hold: {position_mm: 50, force_n: 3, hold_s: 1e1}}]", "x")
-    assert experiment.parse(data).plan[0].content.hold_s == 10
+    assert checked(experiment.Experiment, data).plan[0].content.hold_s == 10

@@ -6,7 +6,15 @@ import pytest
 from sensorgen.core.errors import BadInput
 from sensorgen.core.records import checked
 from sensorgen.design.design import make
-from sensorgen.measure.virtual.mechanics import FAULTS, OPEN_OHM, Mechanics, VirtualRig, VirtualSpecimen, rig_of
+from sensorgen.measure.virtual.mechanics import (
+    BY_DEVICE,
+    FAULTS,
+    OPEN_OHM,
+    Mechanics,
+    VirtualRig,
+    VirtualSpecimen,
+    rig_of,
+)
 from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, drawn
 
 DESIGN = make({"shape": "reference"})
@@ -261,7 +269,7 @@ def test_a_short_opens_under_load():
 
 
 def test_every_fault_has_a_simulator_and_a_line():
-    assert all(fault.about and "\n" not in fault.about and fault.sets for fault in FAULTS.values())
+    assert all(words and "\n" not in words for of in BY_DEVICE.values() for words in of.values())
     assert all(name.startswith(fault.strikes) for name, fault in FAULTS.items())
 
 

@@ -211,7 +211,7 @@ def test_a_simulated_multimeter(model, name):
 
 @pytest.mark.parametrize("fault", ["silent", "hung", "garbage", "identity", "truncated", "cut", "error"])
 def test_a_planted_fault_of_a_multimeter_is_seen(fault):
-    instrument = scpi.SimulatedMultimeter(SpringPlant())
+    instrument = scpi.SimulatedMultimeter(SpringPlant(), "hp-34401a")
     meter = meters.Multimeter(SimulatedPort(instrument, SimulatedClock()))
     if fault not in ("identity", "cut"):
         meter.identify()

@@ -13,7 +13,7 @@ import scipy.io
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.measure.log import Log, RawFile, files, verify
 from sensorgen.measure.log.bench import log_recording, read_again
-from sensorgen.measure.recording import joined_all, read
+from sensorgen.measure.recording import joined_all
 
 MADE = made.presses(8)
 OFFSET_S = 3.217
@@ -94,7 +94,7 @@ def test_columns_of_csv_by_other_names_are_kept_to_read_it_again(run, path, run_
         with pytest.raises(SensorgenError, match="no raw file 'x' in the log"):
             log.raw("x")
     facts = json.loads(row.facts)
-    again = read(raw, facts["columns"])
+    again = made.read(raw, facts["columns"])
     assert again.impedance_ohm[:, 0] == pytest.approx(lived.impedance_ohm[:, 0])
     assert facts["rig_columns"] == {"when": "time_s"}
 

@@ -37,7 +37,7 @@ def test_a_free_name_gets_its_design_in_every_later_row(run, own, path):
         assert {first.design_id, second.design_id} == {load(own).id()}
         assert (first.shape, first.film_mm, first.axes) == ("tri", 0.3, "X")
         assert (first.quantity, first.value, second.defects) == (("Cp",), (2.5e-11,), ("hole",))
-        assert log.prints(specimen="left 3")[0].iteration == 5
+        assert next(log.entries(Print, specimen="left 3")).iteration == 5
     assert "Cp 25 pF at 1kHz" in run("list").words
     assert "design mysensor" in run("show", "S1").words
 

@@ -164,12 +164,13 @@ def test_many_groups_are_held_against_pearsons_test():
 
 def test_groups_count_what_is_known_only():
     made = [
-        Evidence("a", (600.0,), (inf,), 600.0, "tri", 0.1),
-        Evidence("b", (600.0,), (30.0,), 600.0, "tri", 0.1),
-        Evidence("c", (600.0,), (), 600.0, "tri", 0.1),
-        Evidence("d", (600.0,), (9e6,), 600.0, "rect", None),
+        Evidence("a", (600.0,), (inf,), 600.0),
+        Evidence("b", (600.0,), (30.0,), 600.0),
+        Evidence("c", (600.0,), (), 600.0),
+        Evidence("d", (600.0,), (9e6,), 600.0),
     ]
-    found = groups([(of, verdict(of)) for of in made], lambda of: (of.shape, of.film_mm))
+    keys = [("tri", 0.1)] * 3 + [("rect", None)]
+    found = groups((key, of, verdict(of)) for key, of in zip(keys, made, strict=True))
     assert [g.key for g in found] == [("rect", None), ("tri", 0.1)]
     tri = found[1]
     assert (tri.intact.count, tri.intact.total, tri.shorted.count, tri.shorted.total) == (1, 2, 1, 2)

@@ -5,12 +5,25 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from sensorgen.measure.recording import parts
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
 
 TONES_HZ = np.array([1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3])
 EPOCH_S = 1_661_419_320.0
 BLOCK = 14
+
+
+def read_all(path, columns=None):
+    """Recordings of all lock-ins in a file of one part."""
+    (lockins,) = parts(path, columns)
+    return lockins
+
+
+def read(path, columns=None):
+    """Recording of the one lock-in in a file of one part."""
+    (recording,) = read_all(path, columns)
+    return recording
 
 
 def sensor():

@@ -9,9 +9,10 @@ import made
 import numpy as np
 import pytest
 import scipy.io as sio
+from made import read_all
 
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.measure.recording import read_all, rig
+from sensorgen.measure.recording import rig
 
 RUN = made.run(made.presses(1))
 

@@ -7,12 +7,18 @@ import numpy as np
 import scipy.io as sio
 
 from sensorgen.analysis.comparison.expected import moved
+from sensorgen.analysis.report import pieces
 from sensorgen.prediction.bodies import default_body
 from sensorgen.prediction.sensor_model import sensor_model
 
 HOSTILE = "</script><script>document.title='taken'</script><img src=x onerror=alert(1)> \"'&$\\frac{ =cmd|'/c calc'!A1"
 FORMULA = '=HYPERLINK("http://example.org";"x")'
 TRUTH = {"resistivity": 0.5, "capacitance": 1.3, "leak_s": 2e-9, "stiffness": 0.5}
+
+
+def written(report, how):
+    """A report as text."""
+    return "".join(pieces(report, how))
 
 
 def ladder(electrode, leak, sections, other=1.0):

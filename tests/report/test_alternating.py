@@ -6,10 +6,11 @@ import math
 from dataclasses import replace
 
 import pytest
+from bench_files import written
 
 from sensorgen.analysis.comparison import of_iteration
 from sensorgen.analysis.comparison.expected import predicted
-from sensorgen.analysis.report import FORMATS, alternating, report, written
+from sensorgen.analysis.report import FORMATS, alternating, report
 from sensorgen.design.design import load
 from sensorgen.measure.log import Log, notes, prints
 from sensorgen.measure.log.prints import predicted_rows

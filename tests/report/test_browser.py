@@ -4,9 +4,9 @@ import struct
 from pathlib import Path
 
 import pytest
-from bench_files import HOSTILE
+from bench_files import HOSTILE, written
 
-from sensorgen.analysis.report import report, written
+from sensorgen.analysis.report import report
 from sensorgen.measure.log import Log, notes
 
 OUT = Path(__file__).parents[2] / "out" / "report"  # CI keeps it

@@ -14,13 +14,13 @@ from statistics import median, stdev
 
 import numpy as np
 import pytest
-from bench_files import FORMULA, HOSTILE, ladder
+from bench_files import FORMULA, HOSTILE, ladder, written
 from scipy import stats
 
 from no_numbers import roughly_at_rest
 from sensorgen.analysis.comparison import of_iteration
 from sensorgen.analysis.plots.static import files
-from sensorgen.analysis.report import FORMATS, electrodes, report, written, yields
+from sensorgen.analysis.report import FORMATS, electrodes, report, yields
 from sensorgen.core import document
 from sensorgen.core.document import shown as shown_as
 from sensorgen.core.errors import BadInput

@@ -187,7 +187,7 @@ def test_errors_of_position_stand_in_millimetres_and_unknown_ones_are_empty():
     )
     cards = {"a": known, "b": lost, "c": None}
     predictions = {
-        name: SimpleNamespace(prediction=SimpleNamespace(identifiability=card), reason="a short")
+        name: SimpleNamespace(prediction=SimpleNamespace(identifiability=card, reason="a short"))
         for name, card in cards.items()
     }
     (table,) = identifiability(SimpleNamespace(predictions=predictions))

@@ -7,7 +7,7 @@ a new version of either asks anew. Deleting the folder costs time only.
 import json
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, MutableSequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from functools import cache
 from hashlib import sha256
@@ -63,34 +63,28 @@ def answer(question: Mapping[str, JSON], work: Callable[[], JSON]) -> JSON:
 
 
 @contextmanager
-def only_known() -> Iterator[None]:
+def _changed(variable: ContextVar[Any], value: Any) -> Iterator[Any]:
+    """Another value of a variable within, which is given."""
+    before = variable.set(value)
+    try:
+        yield value
+    finally:
+        variable.reset(before)
+
+
+def only_known() -> AbstractContextManager[Any]:
     """Within it :func:`answer` works nothing out: it raises Unknown instead."""
-    before = _ONLY_KNOWN.set(True)
-    try:
-        yield
-    finally:
-        _ONLY_KNOWN.reset(before)
+    return _changed(_ONLY_KNOWN, True)
 
 
-@contextmanager
-def held_back() -> Iterator[list[tuple[Mapping[str, JSON], JSON]]]:
+def held_back() -> AbstractContextManager[list[tuple[Mapping[str, JSON], JSON]]]:
     """Questions and answers that would be kept, for another process to keep: one that may be ended writes nothing."""
-    entries: list[tuple[Mapping[str, JSON], JSON]] = []
-    before = _HELD_BACK.set(entries)
-    try:
-        yield entries
-    finally:
-        _HELD_BACK.reset(before)
+    return _changed(_HELD_BACK, [])
 
 
-@contextmanager
-def nothing_kept() -> Iterator[None]:
+def nothing_kept() -> AbstractContextManager[Any]:
     """Within it no answer is kept, so that each is worked out anew."""
-    before = _HELD_BACK.set(deque(maxlen=0))
-    try:
-        yield
-    finally:
-        _HELD_BACK.reset(before)
+    return _changed(_HELD_BACK, deque(maxlen=0))
 
 
 def known(question: Mapping[str, JSON]) -> JSON | None:

@@ -100,12 +100,9 @@ class Displayed:
     def to_pandas(self) -> Any:
         """The table as a pandas DataFrame, of several that of CSV or the first; raises MissingValue without pandas."""
         from sensorgen.core.document import Table
-        from sensorgen.core.errors import MissingValue
+        from sensorgen.core.errors import library
 
-        try:
-            import pandas as pd
-        except ImportError as error:
-            raise MissingValue("to_pandas() needs pandas: pip install pandas") from error
+        pd = library("pandas", "to_pandas() needs pandas: pip install pandas")
         if hasattr(self, "csv"):
             return pd.read_csv(StringIO("".join(self.csv())))
         table = self.table() if hasattr(self, "table") else next(p for p in self.document() if isinstance(p, Table))

@@ -108,6 +108,11 @@ class Table:
             key, caption, tuple(replace(c, key=name) for name, c in columns.items()), _each(members, cells), members
         )
 
+    @classmethod
+    def some(cls, key: str, caption: str, rows: Sequence[Any]) -> tuple[Self, ...]:
+        """A table as :meth:`of`; none without rows."""
+        return (cls.of(key, caption, rows),) if rows else ()
+
     def beside(self, column: Column, values: Sequence[Cell]) -> "Table":
         """The table with one more column before the first."""
         cells = tuple((value, *row) for value, row in zip(values, self.cells, strict=True))

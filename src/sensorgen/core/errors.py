@@ -4,6 +4,7 @@ import difflib
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any, Self
 
 
@@ -84,6 +85,14 @@ class MissingValue(SensorgenError):
 
 class NotInstalled(MissingValue):
     """A library that an extra of sensorgen brings; the message says how."""
+
+
+def library(name: str, advice: str) -> Any:
+    """Import a library that not everybody has installed; NotInstalled with the advice where it is missing."""
+    try:
+        return import_module(name)
+    except ImportError:
+        raise NotInstalled(advice) from None
 
 
 class Unprintable(SensorgenError):

@@ -55,6 +55,7 @@ def _below(xdg: str, usual: str, apple: str) -> Path:
 
 
 MANIFEST = "manifest.json"
+ELSEWHERE = "; name another place with --out"
 _OURS: set[str] = set()  # parts of this process: an earlier process may have had the same number
 
 
@@ -69,14 +70,12 @@ def staging(folder: Path) -> Iterator[Path]:
     """
     stage = part_of(folder)
     try:
-        try:
+        with writing(folder, advice=ELSEWHERE):
             _refuse_file(folder)
             folder.parent.mkdir(parents=True, exist_ok=True)
             remove_stale_parts(folder.parent, folder.name)
             stage.mkdir()
             yield stage
-        except OSError as error:
-            raise unwritable(folder, error) from None
     finally:
         with _undisturbed():
             shutil.rmtree(stage, ignore_errors=True)
@@ -97,9 +96,19 @@ def reading(path: Path | str) -> Iterator[None]:
         raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
 
 
-def unwritable(path: Path, error: OSError) -> Unwritable:
-    """Error of a place that cannot be written to."""
-    return Unwritable(f"cannot write to {str(path)!r}: {error.strerror or error}; name another place with --out")
+@contextmanager
+def writing(path: Path, cannot: str = "cannot write to", advice: str = "") -> Iterator[None]:
+    """Write to a place inside; errors of the file system say what ``cannot`` be done, and give advice.
+
+    Raises
+    ------
+    Unwritable
+        The place cannot be written to, or the disk is full.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise Unwritable(f"{cannot} {str(path)!r}: {error.strerror or error}{advice}") from None
 
 
 def _refuse_file(folder: Path) -> None:
@@ -227,16 +236,15 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     """
     part = part_of(path)
     try:
-        if path.exists() and not path.is_file():
-            raise Unwritable(f"cannot write {str(path)!r}: it is a folder or a device; expected a file")
-        part.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("wb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    except OSError as error:
-        raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from None
+        with writing(path, "cannot write"):
+            if path.exists() and not path.is_file():
+                raise Unwritable(f"cannot write {str(path)!r}: it is a folder or a device; expected a file")
+            part.parent.mkdir(parents=True, exist_ok=True)
+            with part.open("wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            part.replace(path)
     finally:
         with suppress(OSError):
             part.unlink()
@@ -259,13 +267,10 @@ def listed(folder: Path, manifest: str = MANIFEST) -> list[str]:
     """Files in the manifest of an earlier build; none where it is missing or damaged, and none outside the folder."""
     try:
         names = list(json.loads((folder / manifest).read_text("utf-8"))["files"])
-        return [n for n in names if _inside(folder, folder / n)]
+        files = ((n, folder / n) for n in names if (folder / n).parent.resolve().is_relative_to(folder.resolve()))
+        return [n for n, file in files if file.is_file() or file.is_symlink()]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []
-
-
-def _inside(folder: Path, file: Path) -> bool:
-    return file.parent.resolve().is_relative_to(folder.resolve()) and (file.is_file() or file.is_symlink())
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from pathlib import Path
 from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from sensorgen.core.errors import BadInput, NotInstalled, SensorgenError
+from sensorgen.core.errors import BadInput, NotInstalled, SensorgenError, library
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
@@ -408,11 +408,9 @@ def _check_private(address: str) -> None:
 @contextmanager
 def _on_cluster(address: str) -> Iterator[Sequence[Lane]]:
     """Places of a Dask cluster: two chunks for each of its threads."""
-    import importlib.util
     from concurrent.futures import CancelledError
 
-    if importlib.util.find_spec("distributed") is None:
-        raise NotInstalled("--cluster needs Dask distributed: pip install 'sensorgen[cluster]'")
+    library("distributed", "--cluster needs Dask distributed: pip install 'sensorgen[cluster]'")
     client = _client(address)
     try:
         threads = sum(client.nthreads().values())

@@ -26,7 +26,7 @@ from pydantic import ValidationError
 from sensorgen.core import cache as answers
 from sensorgen.core import files
 from sensorgen.core.display import harmless
-from sensorgen.core.errors import BadInput, NotTrusted, OutOfRange, Unwritable
+from sensorgen.core.errors import BadInput, NotTrusted, OutOfRange
 from sensorgen.core.records import problem
 from sensorgen.design import packs, shape_process
 from sensorgen.scene.polyhedra import Loft, Polyhedron
@@ -123,11 +123,9 @@ def trust(name: str, text: str) -> Path:
         return path
     with suppress(OSError, UnicodeDecodeError):
         trusted = path.read_text("utf-8")
-    try:
+    with files.writing(path, "cannot write"):
         path.parent.mkdir(parents=True, exist_ok=True)
         files.replace(path, f"{trusted}{digest(text)} {name}\n".encode())
-    except OSError as error:
-        raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from None
     return path
 
 

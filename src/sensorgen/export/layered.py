@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from sensorgen.core.arrays import Real, Whole
-from sensorgen.core.errors import MissingValue, OutOfRange
+from sensorgen.core.errors import OutOfRange, library
 from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.layers import LayerRegions, inside, is_rectilinear
 from sensorgen.scene.scene import Body
@@ -135,10 +135,7 @@ def content(voxels: Voxels, bodies: Sequence[Body], permittivity: Mapping[str, f
     MissingValue
         meshio is not installed.
     """
-    try:
-        import meshio
-    except ImportError:
-        raise MissingValue("VTU needs meshio: pip install 'sensorgen[mesh]', or write .3mf, .stl or .step") from None
+    meshio = library("meshio", "VTU needs meshio: pip install 'sensorgen[mesh]', or write .3mf, .stl or .step")
     shape = np.array([len(line) for line in voxels.lines_mm])
     nodes = np.arange(shape.prod()).reshape(shape)
     low, high = slice(None, -1), slice(1, None)

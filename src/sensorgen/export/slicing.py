@@ -140,10 +140,8 @@ def sliced(
     raw, printable = folder / "raw.gcode", folder / "ready.gcode"
     step("files")
     runner = Runner(program, time_limit_s, lambda: step("slicing"))
-    try:
+    with store.writing(folder, advice=store.ELSEWHERE):
         seconds, not_known = _run(pieces, bodies, slicer, raw, runner, title)
-    except OSError as error:
-        raise store.unwritable(folder, error) from None
     text = text_of(raw)
     version = _version(text, slicer)
     step("G-code")

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, within
 from sensorgen.measure import immittance
 from sensorgen.measure.csv_table import miscounted
@@ -22,30 +23,13 @@ EXPECTED = "a header such as Frequency,Cp,D with numbers below it"
 OVERLOAD = 9.9e37  # SCPI's number for no value
 _HEADER_LINES, _HEAD_BYTES = 200, 100_000  # within which the header stands
 _COMMENTS = ("#", "!", "%", "//", "*")
-_NAMES = {
-    "frequency": "frequency freq f testfrequency frequenz fréquence",
-    "Cp": "cp c cparallel parallelcapacitance capacitance", "Cs": "cs cseries seriescapacitance",
-    "D": "d df tand tanδ tandelta dissipation dissipationfactor lossfactor losstangent loss",
-    "Q": "q qualityfactor", "R": "rs r esr re(z) rez z' zre zreal real seriesresistance resistance",
-    "X": "x im(z) imz z'' z\" zim zimag imag imaginary reactance", "Z": "z |z| abs(z) mag(z) impedance zmod magnitude",
-    "phase": "theta θ phase phi φ ph thetaz θz phasez phase(z) arg(z)", "G": "g conductance",
-    "B": "b susceptance", "Y": "y |y| admittance", "Rp": "rp parallelresistance", "Lp": "lp", "Ls": "ls l inductance",
-}  # fmt: skip
-_QUANTITY = {name: quantity for quantity, names in _NAMES.items() for name in names.split()}
-_ASSUMED = {
-    "c": "C read as parallel, Cp", "capacitance": "capacitance read as parallel, Cp", "l": "L read as series, Ls",
-    "inductance": "inductance read as series, Ls",
-}  # fmt: skip
+_WORDS = yamlfile.read(Path(__file__).with_name("lcr.yaml"))
+_QUANTITY = {name: quantity for quantity, names in _WORDS["names"].items() for name in names.split()}
+_FUNCTIONS: dict[str, list[str]] = _WORDS["functions"]  # of meters: what primary and secondary are
 _UNIT = re.compile(r"(?P<name>.+?)\s*(?:[\[(](?P<in>[^\])]*)[\])]|[/_ ](?P<after>[^/_ ]+))")
 _NUMBER = re.compile(rf"(?P<number>{immittance.NUMBER})\s*(?P<unit>\S*)")
 _MISSING = re.compile(r"|[-–]+|n/?a|nan|inf|[-+]?ol|over(load|flow)?|error", re.IGNORECASE)
 _STATUS = ("status", "stat", "state", "error", "validity")
-_FUNCTIONS = {  # what primary and secondary are, by the name of a meter's function (HP 4284A and kin)
-    f"{a}{b}": (immittance_a, immittance_b)
-    for a, immittance_a in (("CP", "Cp"), ("CS", "Cs"), ("LP", "Lp"), ("LS", "Ls"))
-    for b, immittance_b in (("D", "D"), ("Q", "Q"), ("G", "G"), ("RP", "Rp"), ("RS", "R"))
-} | {"RX": ("R", "X"), "GB": ("G", "B"), "ZTD": ("Z", "deg"), "ZTR": ("Z", "rad"), "YTD": ("Y", "deg"),
-     "YTR": ("Y", "rad")}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -138,7 +122,7 @@ def read(path: Path) -> LcrTable:
 def _doubts(columns: Sequence[_Column], overloads: int, faulty: int) -> tuple[str, ...]:
     """Remarks on what was assumed or left out."""
     names = {_name(column.head)[0] for column in columns}
-    doubts = [text for name, text in _ASSUMED.items() if name in names]
+    doubts = [text for name, text in _WORDS["assumed"].items() if name in names]
     doubts += [f"{overloads} cells without a number"] if overloads else []
     doubts += [f"{faulty} rows left out: the meter marked them as faulty"] if faulty else []
     return tuple(doubts)
@@ -227,7 +211,7 @@ def _columns(heads: Sequence[str], before: Sequence[str]) -> Iterator[_Column]:
         yield _Column(at, quantity, scale, head)
 
 
-def _function(before: Sequence[str]) -> tuple[str, str] | None:
+def _function(before: Sequence[str]) -> list[str] | None:
     """Primary and secondary quantity, where a line of settings names the meter's function, as Cp-D or CPD."""
     for line in before:
         for word in re.split(r"[\s,;:=\"]+", line.upper()):

@@ -95,7 +95,7 @@ def _runs(log: Log, row: BenchRun, left_out: list[str]) -> Iterator[_Run]:
             pairs = result.pairs if result.by_force else None
             if with_rig is not None and np.isnan(with_rig.clocks.offset_error_s):
                 left_out.append(f"recording {row.number}: {with_rig.clocks.words()}")
-                pairs = pairs if np.isfinite(recording.epoch_s) else None
+                pairs = pairs if np.isfinite(recording.clock.epoch_s) else None
             yield _Run(recording.tones_hz, pairs, *_rest(result.recording, result.pairs))
 
 

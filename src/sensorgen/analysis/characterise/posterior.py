@@ -339,7 +339,8 @@ def candidates(
     theta, spread = np.array([(u.centre, u.spread) for u in unknowns]).T
     information = []
     for coupon in coupons:
-        noise = noise_of(coupon, unknowns, theta, meters)
+        expected = coupon.expected(physical(unknowns, theta), {s.key: np.asarray(s.drawn) for s in coupon.sizes})
+        noise = np.array([meters.noise(r, float(v)) for r, v in zip(coupon.readings, expected, strict=True)])
         line = linearised(coupon, nominal(coupon, meters), noise, unknowns, theta)
         white = whitening(line.covariance) @ line.jacobian
         information.append(white.T @ white)
@@ -347,13 +348,6 @@ def candidates(
     counted = np.array([not target.derived for target in targets])
     goals = np.array([target.goal or np.inf for target in targets])
     return Candidates(tuple(coupons), np.array(information), np.diag(spread**-2.0), wanted, counted, goals)
-
-
-def noise_of(coupon: Coupon, unknowns: Sequence[Parameter], theta: Real, meters: Meters) -> Real:
-    """Standard deviations of ln of a coupon's expected readings."""
-    sizes = {size.key: np.asarray(size.drawn) for size in coupon.sizes}
-    expected = coupon.expected(physical(unknowns, theta), sizes)
-    return np.array([meters.noise(r, float(v)) for r, v in zip(coupon.readings, expected, strict=True)])
 
 
 def select(candidates: Candidates, count: int, fits: Fits) -> tuple[int, ...]:

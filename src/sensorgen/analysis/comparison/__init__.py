@@ -237,7 +237,7 @@ def _first(left_out: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
 def _printed(log: Log, left_out: list[tuple[str, str]]) -> dict[str, Print]:
     """The latest print of each specimen; one that two machines have bound to different designs is left out."""
     latest: dict[str, Print] = {}
-    for row in log.prints():
+    for row in log.entries(Print):
         before = latest.setdefault(row.specimen, row)
         if before.design_id != row.design_id:
             both = f"{before.design} ({before.design_id}) and {row.design} ({row.design_id})"
@@ -327,11 +327,7 @@ def _usual_ohm(
 def _evidence(reading: Measured, of: Predicted | None, expected_ohm: float = nan) -> Evidence:
     """Readings that a resistance can have; a slip below 0 is kept in the log, with a doubt."""
     ry, rz = (tuple(v for v in values if v >= 0) for values in (reading.y_ohm, reading.z_ohm))
-    words, touches = reading.words, of is not None and of.touches
-    return Evidence(
-        words.specimen, ry, rz, expected_ohm, words.shape, words.film_mm, words.remark, touches, words.axes,
-        words.batch, words.baked, words.defects,
-    )  # fmt: skip
+    return Evidence(reading.specimen, ry, rz, expected_ohm, of is not None and of.touches, reading.words.batch)
 
 
 def _intact_ohm(of: Predicted | None, instrument: str) -> float:

@@ -68,19 +68,15 @@ class Predicted:
         """Along one electrode, of a tight film [ohm]; None where no resistance is predicted."""
         return self.along_ohm(inf)
 
-    def along_ohm(self, rz_ohm: float) -> Bounds | None:
+    @cached_property
+    def along_ohm(self) -> Callable[[float], Bounds | None]:
         """Reading along an electrode of a film that reads ``rz_ohm`` across; None where no resistance is predicted.
 
         The film is a ladder of leaks: one electrode where it is tight, both in parallel where it is a short. Without a
         reading across (nan) it is taken for tight, and the range holds a short too. The value is the geometric mean of
         both electrodes, as the readings do not say which was measured; the range is that of the best and the worst,
-        with the errors of models, print and materials.
+        with the errors of models, print and materials. Evaluated once for films that are alike.
         """
-        return self._along_ohm(rz_ohm)
-
-    @cached_property
-    def _along_ohm(self) -> Callable[[float], Bounds | None]:
-        """Law of the reading, evaluated once for films that are alike."""
         ends = [r.alone() for r in self.prediction.resistance.values()]
         values, parts = [r.value for r in ends], [*zip(*((r, r.model, r.print, r.material) for r in ends), strict=True)]
         ranges = [([of.lower for of in part], [of.upper for of in part]) for part in parts]
@@ -119,11 +115,6 @@ class Predicted:
             return None
         re, im = at.re, at.im
         return complex(re.value, im.value), complex(re.lower, im.upper), complex(re.upper, im.lower)
-
-    @property
-    def reason(self) -> str:
-        """Why there is no capacitance."""
-        return self.prediction.reason
 
     @property
     def provenance(self) -> str:

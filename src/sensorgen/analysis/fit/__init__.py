@@ -121,7 +121,8 @@ def _groups(allowing: Sequence[tuple[Compared, AllowedValues]]) -> dict[str, lis
     """Readings by shape and direction, each with whether its electrode is sound."""
     groups: dict[str, list[tuple[AllowedValues, bool]]] = {}
     for row, reading in allowing:
-        groups.setdefault(f"{row.evidence.shape} {row.evidence.axes}".strip(), []).append((reading, usable(row)))
+        shape = f"{row.reading.shape} {row.reading.words.axes}".strip()
+        groups.setdefault(shape, []).append((reading, usable(row)))
     return groups
 
 

@@ -38,6 +38,7 @@ def files(
     """
     from sensorgen.analysis.plots import pages, results, static
     from sensorgen.analysis.plots.figure import needed
+    from sensorgen.core.units import M_PER_MM
 
     needed("matplotlib", "plotly")
     answer = results.response(sensor, frequency_hz, force_n, position_mm)
@@ -47,7 +48,7 @@ def files(
         yield f"{figure.key}.png", static.png(figure)
     words = (
         f"{len(frequency_hz)} frequencies, {force_n[0]:g} to {force_n[-1]:g} N, "
-        f"{position_mm[0]:g} to {position_mm[-1]:g} mm, tip {answer.tip_mm:g} mm."
+        f"{position_mm[0]:g} to {position_mm[-1]:g} mm, tip {sensor.tip_m / M_PER_MM:g} mm."
     )
     sections = [pages.PageSection(figures=tuple(drawn))]
     yield PAGE, pages.page(f"{title or 'Sensor'} under load", [words], sections).encode()

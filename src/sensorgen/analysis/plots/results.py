@@ -30,7 +30,7 @@ from sensorgen.core.arrays import Complex, Mask, Real, Whole
 from sensorgen.core.document import Cell, Table
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
-from sensorgen.models.sensor import Sensor
+from sensorgen.models.sensor import Response, Sensor
 from sensorgen.prediction.compression import CompressionResult
 from sensorgen.prediction.identifiability.fisher import LeastErrors, Setup, bounds, required, slopes
 from sensorgen.prediction.identifiability.identify import HIGHEST_HZ, surface
@@ -314,45 +314,40 @@ QUANTITIES = {
 
 @dataclass(frozen=True)
 class ResponseMap:
-    """Impedance and its slopes; the axes of the arrays are frequency, force and position.
+    """Impedance and its exact slopes; the axes of the arrays are frequency, force and position.
 
     Attributes
     ----------
     frequency_hz, force_n, position_mm : (n,) array
         Frequencies [Hz], forces [N], centres of the tip [mm].
-    impedance_ohm : complex array
-        Impedance [ohm].
-    by_force_ohm_per_n, by_position_ohm_per_mm : complex array
-        Its exact derivatives [ohm/N], [ohm/mm].
-    tip_mm, length_mm : float
-        Of the tip and of the sensor [mm].
+    response : Response
+        Over them.
+    sensor : Sensor
+        Under load.
     """
 
     frequency_hz: Real
     force_n: Real
     position_mm: Real
-    impedance_ohm: Complex
-    by_force_ohm_per_n: Complex
-    by_position_ohm_per_mm: Complex
-    tip_mm: float
-    length_mm: float
+    response: Response
+    sensor: Sensor
 
     def values(self, name: str) -> Real:
         """One of ``QUANTITIES``, over frequency, force and position, in the unit named there."""
-        slopes = {"position": self.by_position_ohm_per_mm, "force": self.by_force_ohm_per_n}
         part, _, by = name.partition("-by-")
-        source = slopes.get(by, self.impedance_ohm)
+        z, by_force, by_position = self.response
+        source = {"position": by_position * M_PER_MM, "force": by_force}.get(by, z)
         return np.asarray(source.real if part == "resistance" else source.imag)
 
     def on_sensor(self) -> Mask:
         """Positions where the whole tip rests on the sensor; all, where it does at none."""
-        half = self.tip_mm / 2 * (1 + 1e-9)  # where the tip just reaches an end, the slopes jump
-        inside = (self.position_mm > half) & (self.position_mm < self.length_mm - half)
+        half = self.sensor.tip_m / M_PER_MM / 2 * (1 + 1e-9)  # where the tip just reaches an end, the slopes jump
+        inside = (self.position_mm > half) & (self.position_mm < self.sensor.length_m / M_PER_MM - half)
         return inside if inside.any() else ~inside
 
     def folds(self) -> Mask:
         """Loads beyond which (F, x) -> (R, X) turns over: the sign of its determinant changes towards the next."""
-        turning = (np.conj(self.by_force_ohm_per_n) * self.by_position_ohm_per_mm).imag
+        turning = (np.conj(self.response.by_force_ohm_per_n) * self.response.by_position_ohm_per_m).imag
         turning = np.sign(np.where(np.abs(turning) > 1e-12 * np.abs(turning).max(initial=0), turning, 0))
         folded = np.zeros(turning.shape, bool)
         folded[:, :-1] |= turning[:, :-1] * turning[:, 1:] < 0
@@ -385,10 +380,7 @@ def response(
             f"{len(f)} frequencies, {len(force)} forces and {len(at)} positions are too much to draw; "
             f"expected up to {MOST_FREQUENCIES} frequencies and {LARGEST} points in all: use larger steps"
         )
-    result = sensor.response(f[:, None, None], force[:, None], at * M_PER_MM)
-    by_mm = result.by_position_ohm_per_m * M_PER_MM
-    size = (sensor.tip_m / M_PER_MM, sensor.length_m / M_PER_MM)
-    return ResponseMap(f, force, at, result.impedance_ohm, result.by_force_ohm_per_n, by_mm, *size)
+    return ResponseMap(f, force, at, sensor.response(f[:, None, None], force[:, None], at * M_PER_MM), sensor)
 
 
 def lines(frequency_hz: Sequence[float], force_n: Real, position_mm: Real, impedance_ohm: Complex, name: str) -> Figure:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from math import nan
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sensorgen.analysis.comparison import UNTRUSTED, Comparison, known_iterations, of_iteration
@@ -22,6 +23,7 @@ from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, BodyT
 from sensorgen.analysis.plots.pages import Drawing, PageSection
 from sensorgen.analysis.report import alternating, electrodes, explained, history, recordings, yields
 from sensorgen.checks.review import draw
+from sensorgen.core import yamlfile
 from sensorgen.core.document import Column, Table, plain, safe, spreadsheet
 from sensorgen.core.document import markdown as document
 from sensorgen.core.errors import BadInput
@@ -268,25 +270,31 @@ def _sections(log: Log, data: _ReportData) -> Iterator[PageSection]:
     """All sections in order; those without tables, figures and drawings are not shown."""
     comparison, recorded = data.comparison, data.recorded
     brief = len(comparison.rows) <= 1 and not recorded
+    notes = yamlfile.read(Path(__file__).with_name("notes.yaml"))
+    told: dict[str, Any] = {} if brief else notes
     direct = [electrodes.readings(comparison)] if comparison.direct else []
     at_rest = [data.impedances] if data.impedances else []
-    notes = electrodes.NOTES if direct and not brief else ()
     figures = (*electrodes.figures(comparison), *recordings.residuals(data.impedances))
-    yield PageSection("measured", "Measured and predicted", figures, (*direct, *at_rest, *notes))
+    parts = (*direct, *at_rest, *(told.get("measured", ()) if direct else ()))
+    yield PageSection("measured", "Measured and predicted", figures, parts)
     figures = tuple(alternating.figures(data.ac))
-    yield PageSection("ac", "Capacitance and impedance by frequency", figures, alternating.parts(data.ac))
-    verdicts = yields.parts(comparison, brief=brief)
+    parts = (*Table.some("ac", "AC readings and their prediction as printed, by frequency", data.ac), *notes["ac"])
+    yield PageSection("ac", "Capacitance and impedance by frequency", figures, parts)
+    verdicts = yields.parts(comparison, told.get("verdicts", ()))
     yield PageSection("verdicts", "Verdicts and yield", yields.figures(comparison), verdicts)
-    yield PageSection("changes", "Bake, shrinkage and defects", (), history.parts(data.changes, brief=brief))
-    yield PageSection("explained-by", "Which parameter explains the residuals", (), explained.parts(data.explanations))
-    yield PageSection("calibrated", "Calibrated specimens", (), history.calibration_parts(data.calibrated))
+    parts = Table.some("changes", "Bake, shrinkage and defects, and the change that they made", data.changes)
+    yield PageSection("changes", "Bake, shrinkage and defects", (), (*parts, *told.get("changes", ())))
+    parts = Table.some("explained", "Share of the residuals that one parameter explains", data.explanations)
+    yield PageSection("explained-by", "Which parameter explains the residuals", (), (*parts, *notes["explained-by"]))
+    calibrated = [history.calibration_row(one) for one in data.calibrated]
+    parts = (*Table.some("calibrations", "Specimens by their calibration", calibrated), *notes["calibrated"])
+    yield PageSection("calibrated", "Calibrated specimens", (), parts)
     yield PageSection("recorded", "Recordings", tuple(recordings.figures(recorded)), recordings.facts(recorded))
     figures = () if brief else tuple(_variants(comparison))
     yield PageSection("variants", "The variants", figures, identifiability(comparison), _drawings(comparison))
-    if data.left_out:
-        caption = "What was left out, or taken with care, and why"
-        omitted = Table.of("left_out", caption, tuple(LeftOut(*row) for row in data.left_out))
-        yield PageSection("left-out", "What was left out, and why", parts=(omitted,))
+    caption = "What was left out, or taken with care, and why"
+    omitted = Table.some("left_out", caption, [LeftOut(*row) for row in data.left_out])
+    yield PageSection("left-out", "What was left out, and why", parts=omitted)
     yield PageSection("provenance", "Provenance", parts=(origins(log, comparison, brief=brief),))
 
 
@@ -367,11 +375,6 @@ def pieces(content: Report, how: str) -> Iterator[str]:
     return _WRITERS[how](content)
 
 
-def written(content: Report, how: str) -> str:
-    """A report as text; parameters as :func:`pieces`."""
-    return "".join(pieces(content, how))
-
-
 _WRITERS = {"html": html, "md": markdown, "csv": comma_separated, "json": as_json}
 FORMATS = tuple(_WRITERS)
 
@@ -400,7 +403,7 @@ def _drawings(comparison: Comparison) -> tuple[Drawing, ...]:
         r, c = of.ry_ohm, of.prediction.capacitance
         words = (
             f"electrode resistance {r.words() if r else 'unknown'}",
-            f"capacitance {c.words()}" if c else f"no capacitance: {of.reason}",
+            f"capacitance {c.words()}" if c else f"no capacitance: {of.prediction.reason}",
             of.provenance,
         )
         sheets.append(Drawing(name, design.id(), draw(design, reviewed(design)), "; ".join(words)))
@@ -414,10 +417,10 @@ def identifiability(comparison: Comparison) -> tuple[Table, ...]:
         card = of.prediction.identifiability
         force, place, together = _known(card)
         bench_force, bench_place, _ = _known(card and card.calibrated)
-        verdict = card.verdict if card else of.reason or "no prediction"
+        verdict = card.verdict if card else of.prediction.reason or "no prediction"
         rows.append(IdentifiabilityRow(name, force, place, together, bench_force, bench_place, verdict))
     caption = f"Standard errors of {FORCE_N:g} N in the middle, predicted, by seven frequencies (Cramér-Rao)"
-    return (Table.of("identifiability", caption, rows),) if rows else ()
+    return Table.some("identifiability", caption, rows)
 
 
 def _known(of: StandardErrors | None) -> tuple[float, float, float]:

@@ -11,7 +11,7 @@ from typing import Annotated
 from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.comparison.expected import Predicted
 from sensorgen.analysis.plots.figure import BLUE, GREY, Axis, Curve, Figure, Panel
-from sensorgen.core.document import Cell, Column, Part, Table, some
+from sensorgen.core.document import Cell, Column, some
 from sensorgen.core.units import frequency_text
 from sensorgen.measure import accuracy
 from sensorgen.measure.log import Reading
@@ -20,11 +20,6 @@ from sensorgen.prediction.query import TONES_HZ
 
 F_PER_PF = 1e-12
 BAKED = {True: "baked", False: "not baked", None: "unknown"}
-NOTE = (
-    "The uncertainty is the standard one: scatter of the repeats (type A) and the instrument's limit of error over the "
-    "root of 3, or what was stated (type B), added in squares. A specimen is a capacitor at a frequency where its "
-    "phase is beyond -45 deg. Ranges of predictions hold the errors of models, print and materials."
-)
 
 
 @dataclass(frozen=True)
@@ -112,12 +107,6 @@ def _predicted(of: Predicted | None, frequency_hz: float) -> tuple[_Range, _Rang
     c, by = (1 / z[0]).imag / (2 * pi * frequency_hz), parallel_range_f(of.prediction, frequency_hz)
     low, high = sorted((abs(z[1]), abs(z[2])))
     return (c, min(by.lower, c), max(by.upper, c)), (abs(z[0]), min(low, abs(z[0])), max(high, abs(z[0])))
-
-
-def parts(rows: Sequence[AcRow]) -> tuple[Part, ...]:
-    """The rows as a table, and a note; nothing without rows."""
-    caption = "AC readings and their prediction as printed, by frequency"
-    return (Table.of("ac", caption, tuple(rows)), NOTE) if rows else ()
 
 
 def _compared(rows: Sequence[AcRow]) -> list[AcRow]:

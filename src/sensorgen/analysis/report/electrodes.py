@@ -19,15 +19,6 @@ from sensorgen.measure.signal.verdicts import WORDS
 VERDICT_COLOURS = dict(zip(WORDS, (PINK, ORANGE, YELLOW, SKY, GREEN, DARK), strict=True))
 MOST_ROWS = 200  # of a figure: more cannot be read
 _ALIKE = 1.05  # ratio up to which two resistances are called alike
-NOTES = (
-    "The prediction is that of the network that was measured: one electrode where the film is tight, both in parallel "
-    "where it is a short, and a ladder of even leaks with the reading between the electrodes in between. Without that "
-    "reading the interval runs from the short to the tight film.",
-    "The interval holds both electrodes, because the log does not say which was measured. The ratio is that of the "
-    "least reading and the predicted value.",
-)
-
-
 _LEAST, _HIGHEST = "the least reading along an electrode", "the highest of several readings along an electrode"
 _UNCERTAINTY = "standard uncertainty: scatter, and the meter's limit of error"
 

@@ -20,7 +20,7 @@ from sensorgen.analysis.comparison.expected import Movable, at_rest, moved, pres
 from sensorgen.analysis.comparison.measured import RecordedRun
 from sensorgen.analysis.report.electrodes import usable
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.core.document import Column, Part, Table
+from sensorgen.core.document import Column
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.measure.signal.verdicts import INTACT_OHM, across_ohm
@@ -33,12 +33,6 @@ _GRID = 31
 _STEP = 1e-3
 _OPEN = log(1e6)  # a larger factor is shown as this one: nothing is known
 _FLAT = 1e-9  # share below which a parameter has no effect
-
-NOTE = (
-    "Each parameter is moved alone, for all specimens together, until the squared residuals are least. Film resistance "
-    "is compared up to the meter's highest range, the prediction for a film without leakage; it is not compared where "
-    "the electrodes touch as printed."
-)
 
 Model = Callable[[str, float], Complex]
 
@@ -75,12 +69,6 @@ def explanations(comparison: Comparison, recorded: Sequence[RecordedRun]) -> lis
         one for kind in kinds
         for one in sorted((_explained(kind, p) for p in PARAMETERS), key=lambda one: -one.share_percent)
     ]  # fmt: skip
-
-
-def parts(explanations: Sequence[Explanation]) -> tuple[Part, ...]:
-    """A row for each, and a note; nothing without any."""
-    caption = "Share of the residuals that one parameter explains"
-    return (Table.of("explained", caption, tuple(explanations)), NOTE) if explanations else ()
 
 
 def sentences(explanations: Sequence[Explanation]) -> Iterator[str]:

@@ -7,18 +7,13 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.report.alternating import BAKED, AcRow, at_text
-from sensorgen.core.document import Cell, Column, Part, Table
+from sensorgen.core.document import Cell, Column
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log import Log
 
 if TYPE_CHECKING:
     from sensorgen.prediction.calibration.calibration import Calibration
-
-CALIBRATION_NOTE = (
-    "Ratios of a calibrated specimen to its prediction, with intervals in the JSON of `sensorgen calibrate`. Covered: "
-    "presses held back in turn that lie in their 90 % intervals."
-)
 
 
 @dataclass(frozen=True)
@@ -52,13 +47,8 @@ def latest(log: Log, specimens: Container[str], left_out: list[tuple[str, str]])
     return calibrated
 
 
-def calibration_parts(calibrations: "Sequence[Calibration]") -> tuple[Part, ...]:
-    """A row for each, and a note; nothing without any."""
-    rows = [_calibration_row(one) for one in calibrations]
-    return (Table.of("calibrations", "Specimens by their calibration", rows), CALIBRATION_NOTE) if rows else ()
-
-
-def _calibration_row(one: "Calibration") -> CalibrationRow:
+def calibration_row(one: "Calibration") -> CalibrationRow:
+    """Row of a calibration."""
     values, held_out, sensor = {v.name: v.value for v in one.values()}, one.held_out, one.model.sensor
     return CalibrationRow(
         one.specimen, one.design, one.posterior.presses, values["resistance"] / sensor.resistance_ohm(),
@@ -72,18 +62,13 @@ def _calibration_row(one: "Calibration") -> CalibrationRow:
 def calibration_findings(calibrations: "Sequence[Calibration]") -> Iterator[str]:
     """One sentence for each specimen."""
     for one in calibrations:
-        row = _calibration_row(one)
+        row = calibration_row(one)
         yield (
             f"{one.specimen} is calibrated by {row.presses} known presses: R {row.r_ratio:.3g}, C {row.c_ratio:.3g} "
             f"and rise of C {row.rise_ratio:.3g} times the predicted ones."
         )
 
 
-NOTE = (
-    "A change is the ratio to the specimen's reading before, in its earlier state; of its first reading, to the "
-    "prediction. The bake shrinks a sensor in its plane: a share s takes C to (1 - s)^2 of it, and leaves the "
-    "resistance along the electrodes. A defect's change holds whatever else happened between the two readings."
-)
 _UNTOLD = None, "", ""  # bake, defects and remark of a reading of which none is known
 
 
@@ -184,9 +169,3 @@ def findings(rows: Sequence[HistoryRow]) -> Iterator[str]:
         shrunk = f"; its shrinkage alone makes C x {row.expected_change:.3g}" if row.expected_change else ""
         if changed and state:
             yield f"Reading {row.number} ({state}) against {row.against}: {changed}{shrunk}."
-
-
-def parts(rows: Sequence[HistoryRow], *, brief: bool) -> tuple[Part, ...]:
-    """The rows as a table, with a note unless it is to be brief; nothing without rows."""
-    caption = "Bake, shrinkage and defects, and the change that they made"
-    return (Table.of("changes", caption, tuple(rows)), *([] if brief else [NOTE])) if rows else ()

@@ -104,14 +104,14 @@ def _predicted(of: Bounds | None) -> tuple[float | None, float | None, float | N
 
 def facts(recorded: Sequence[RecordedRun]) -> tuple[Table, ...]:
     """A row for each recording; no table without any."""
-    rows = tuple(
+    rows = [
         RecordingRow(
             run.name, run.source.file, run.source.format, run.source.program, run.samples, run.valid, run.seconds,
             run.source.rate_hz, len(run.pairs.time_s) if run.pairs else 0, "; ".join(run.notes),
         )
         for run in recorded
-    )  # fmt: skip
-    return (Table.of("recordings", "Recordings of the rig", rows),) if rows else ()
+    ]  # fmt: skip
+    return Table.some("recordings", "Recordings of the rig", rows)
 
 
 def headline(table: Table | None) -> Iterator[str]:

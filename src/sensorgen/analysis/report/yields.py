@@ -7,11 +7,12 @@ from statistics import geometric_mean, median
 from typing import Annotated
 
 from sensorgen.analysis.comparison import Compared, Comparison
+from sensorgen.analysis.comparison.measured import Words
 from sensorgen.analysis.plots.figure import BLUE, BROWN, GREY, MOST_POINTS, PURPLE, Axis, Curve, Figure, Panel
 from sensorgen.analysis.report.alternating import BAKED
 from sensorgen.analysis.report.electrodes import VERDICT_COLOURS, reasons, usable
 from sensorgen.core.document import Cell, Column, Part, Table
-from sensorgen.measure.signal.verdicts import ORDER, REACTANCES, WORDS, CountShare, Evidence, Group, dependence, groups
+from sensorgen.measure.signal.verdicts import ORDER, REACTANCES, WORDS, CountShare, Group, dependence, groups
 from sensorgen.prediction.query import TONES_HZ
 
 _LOOKS = {  # none with the colour of a verdict
@@ -26,13 +27,13 @@ def film_text(film_mm: float | None) -> str:
     return "unknown" if film_mm is None else f"{film_mm:g} mm"
 
 
-BY: dict[str, Callable[[Evidence], tuple[Hashable, ...]]] = {
+BY: dict[str, Callable[[Words], tuple[Hashable, ...]]] = {
     "shape": lambda of: (of.shape or "unknown",),
     "film": lambda of: (film_text(of.film_mm),),
     "shape and film": lambda of: (of.shape or "unknown", film_text(of.film_mm)),
     "direction": lambda of: (of.shape or "unknown", of.axes or "unknown"),
     "bake": lambda of: (BAKED[of.baked],),
-    "plate": lambda of: (of.plate or "unknown",),
+    "plate": lambda of: (of.batch or "unknown",),
     "defect": lambda of: (of.defects or "none",),
     "remark": lambda of: (of.remark or "none",),
 }
@@ -70,12 +71,12 @@ class YieldRow:
 def judged(comparison: Comparison, by: str) -> list[Group]:
     """Groups of one kind."""
     rows = comparison.by_bake if by == "bake" else comparison.last
-    return groups(((row.evidence, row.verdict) for row in rows), BY[by])
+    return groups((BY[by](row.reading.words), row.evidence, row.verdict) for row in rows)
 
 
 def everything(comparison: Comparison) -> Group:
     """All specimens as one group."""
-    return groups(((row.evidence, row.verdict) for row in comparison.last), lambda _: ())[0]
+    return groups(((), row.evidence, row.verdict) for row in comparison.last)[0]
 
 
 def headline(comparison: Comparison) -> Iterator[str]:
@@ -160,37 +161,24 @@ def _name(group: Group) -> str:
     return ", ".join(map(str, group.key))
 
 
-def notes(comparison: Comparison) -> tuple[str, ...]:
-    """Notes on the rules of verdicts and counts."""
-    how = (
-        "The verdict is the gravest of the electrode's and the film's. An electrode is compared with its prediction "
-        "times the median of measured over predicted of its shape's readings within their predicted ranges, if any. "
-        "A film resistance up to that of two electrodes in series is a short. A film is intact from "
-        f"{REACTANCES:g} times its predicted reactance at {TONES_HZ[0] / 1e3:g} kHz on, where a leak changes the "
-        f"impedance by {50 / REACTANCES**2:g} %, or from the meter's highest range on; between, it leaks."
-    )
-    if len(comparison.last) == 1:
-        return (how,)
-    earlier = len(comparison.direct) - len(comparison.last)
-    more = f"; {earlier} earlier readings are not counted" if earlier else ""
-    return (
-        how,
-        f"Each specimen counts once, with its last reading{more}. Specimens shorted by design have a verdict, but "
-        "count for no share. Intervals are Clopper's and Pearson's, wider where plates differ (Korn and Graubard). "
-        "Differences between films and between shapes are "
-        f"tested (Fisher; Freeman and Halton) and affirmed below p = {DIFFER:g}; every other comparison of groups is "
-        "exploratory.",
-    )
+def notes(comparison: Comparison, texts: Sequence[str]) -> Iterator[str]:
+    """Notes on the rules of verdicts and, where there are several specimens, of counts."""
+    count = len(comparison.direct) - len(comparison.last)
+    earlier = f"; {count} earlier readings are not counted" if count else ""
+    for text in texts[: 1 if len(comparison.last) == 1 else None]:
+        yield text.format(
+            reactances=REACTANCES, khz=TONES_HZ[0] / 1e3, change_percent=50 / REACTANCES**2, earlier=earlier,
+            differ=DIFFER,
+        )  # fmt: skip
 
 
-def parts(comparison: Comparison, *, brief: bool) -> tuple[Part, ...]:
-    """Tables of verdicts, with notes unless they are to be brief; nothing without DC readings."""
+def parts(comparison: Comparison, texts: Sequence[str]) -> tuple[Part, ...]:
+    """Tables of verdicts, with notes; nothing without DC readings."""
     if not comparison.direct:
         return ()
     tables = [table(comparison)] if len(comparison.last) > 1 else []
-    if directions := rows(comparison):
-        tables.append(Table.of("direction", "Electrode resistance by direction of the cogs", directions))
-    return (*tables, reasons(comparison), *(() if brief else notes(comparison)))
+    directions = Table.some("direction", "Electrode resistance by direction of the cogs", rows(comparison))
+    return (*tables, *directions, reasons(comparison), *notes(comparison, texts))
 
 
 def table(comparison: Comparison) -> Table:
@@ -308,8 +296,9 @@ def rows(comparison: Comparison) -> list[DirectionRow]:
     last = {row.reading.specimen: row for row in usable(comparison)}
     groups: dict[tuple[str, float | None], dict[str, list[Compared]]] = {}
     for row in last.values():
-        if axes := row.evidence.axes:
-            groups.setdefault((row.evidence.shape, row.evidence.film_mm), {}).setdefault(axes, []).append(row)
+        words = row.reading.words
+        if words.axes:
+            groups.setdefault((words.shape, words.film_mm), {}).setdefault(words.axes, []).append(row)
     tests = []
     for (shape, film_mm), by in sorted(groups.items(), key=lambda item: (item[0][0], item[0][1] is None, item[0][1])):
         if len(by) == 2 and min(map(len, by.values())) > 1:

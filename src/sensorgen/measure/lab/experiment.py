@@ -324,12 +324,7 @@ def read(path: Path) -> Experiment:
         A file that cannot be read, or a key that is unknown, missing or of another kind, with file and key.
     """
     with within(str(path)):
-        return parse(yamlfile.read(path))
-
-
-def parse(data: Any) -> Experiment:
-    """An experiment from plain data; errors as :func:`read`."""
-    return checked(Experiment, data)
+        return checked(Experiment, yamlfile.read(path))
 
 
 def from_json(data: Any) -> Experiment:
@@ -390,17 +385,13 @@ def check(experiment: Experiment, length_mm: float, seconds: float) -> None:
         )
 
 
-def _largest_n(key: str, part: Kind) -> tuple[float, str]:
-    """Largest force of a part [N], and the names of what gives it."""
+def _check_part(key: str, part: Kind, limit_n: float, places_mm: tuple[float, float]) -> None:
     if isinstance(part, Sine):
         if part.amplitude_n >= part.mean_n:
             raise OutOfRange(f"{key}.amplitude_n: {part.amplitude_n:g} N lifts the tip; expected less than mean_n")
-        return part.mean_n + part.amplitude_n, "mean_n + amplitude_n"
-    return float(np.max(part.force_n)), "force_n"
-
-
-def _check_part(key: str, part: Kind, limit_n: float, places_mm: tuple[float, float]) -> None:
-    largest, name = _largest_n(key, part)
+        largest, name = part.mean_n + part.amplitude_n, "mean_n + amplitude_n"
+    else:
+        largest, name = float(np.max(part.force_n)), "force_n"
     if largest > _ROOM * limit_n:
         raise OutOfRange(
             f"{key}.{name}: {largest:g} N; expected up to {_ROOM * limit_n:.4g} N, {_ROOM:.0%} of limits.force_n, "

@@ -13,12 +13,12 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Protocol
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Mask, Real, Whole
-from sensorgen.core.errors import BadInput, MissingValue
+from sensorgen.core.errors import BadInput, library
 from sensorgen.core.files import reading
 from sensorgen.measure.array_frames import HDF, swapped
 from sensorgen.measure.lab.devices import Clock, DeviceFault, FrameMeter
@@ -35,29 +35,19 @@ _CHUNK = 64  # frames
 _COMPLEX = np.complex64  # seven digits, as of the stream
 
 
-class FrameFile(Protocol):
-    """File of frames."""
-
-    def add(self, siemens: Complex, time_s: Real, rest: Mask) -> None:
-        """Append frames, (k, m, n)."""
-
-    def close(self) -> None:
-        """Complete the file."""
-
-
 def _part(path: Path) -> Path:
     """File with the frames of an NPZ until it is packed; what a killed run leaves."""
     return path.with_name(path.name + ".part")
 
 
-def recorder(path: Path, shape: tuple[int, int], frequency_hz: float) -> FrameFile:
+def recorder(path: Path, shape: tuple[int, int], frequency_hz: float) -> "FrameFile":
     """A new file of frames, of the kind that its name ends in.
 
     Raises
     ------
     BadInput
         The file exists, or its name ends otherwise.
-    MissingValue
+    NotInstalled
         HDF5 without h5py.
     """
     if there := [one for one in (path, _part(path)) if one.exists()]:
@@ -92,10 +82,7 @@ class _Hdf:
     """HDF5 that grows."""
 
     def __init__(self, path: Path, shape: tuple[int, int], frequency_hz: float) -> None:
-        try:
-            import h5py
-        except ImportError:
-            raise MissingValue("HDF5 needs h5py: pip install h5py, or record as .csv or .npz") from None
+        h5py = library("h5py", "HDF5 needs h5py: pip install h5py, or record as .csv or .npz")
         self._file = h5py.File(path, "w")
         self._file["frequency_hz"] = frequency_hz
         for name, dtype, part in (("siemens", _COMPLEX, shape), ("time_s", float, ()), ("rest", np.uint8, ())):
@@ -139,6 +126,7 @@ class _Packed:
             self._part.unlink()
 
 
+FrameFile = _Csv | _Hdf | _Packed
 REST_S = 1.0  # that a command marks as unloaded
 _WAITING = 128  # frames
 _IDLE_S = 0.005
@@ -168,7 +156,7 @@ class FrameFeed:
 
     meter: FrameMeter
     clock: Clock
-    recorder: "FrameFile | None" = None
+    recorder: FrameFile | None = None
     unloaded_s: float = 0.0
     recording: bool = True
     paused: bool = False

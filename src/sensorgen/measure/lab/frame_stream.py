@@ -18,7 +18,7 @@ import zlib
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from math import inf, isfinite, nan
+from math import inf, isfinite, isnan, nan
 
 import numpy as np
 
@@ -99,7 +99,8 @@ class FrameForm:
             values = np.stack([siemens.real, siemens.imag], -1)
         else:
             values = siemens.imag / (2 * np.pi * self.frequency_hz)
-        words = map(_word, (values / _PREFIXES[self.prefix]).ravel().tolist())
+        numbers = (values / _PREFIXES[self.prefix]).ravel().tolist()
+        words = (f"{v:.7g}" if isfinite(v) else "" if isnan(v) else _SATURATED for v in numbers)
         return checked(",".join([str(counter), f"{time_s:.6f}", *words]))
 
     def siemens(self, words: Sequence[str]) -> Complex:
@@ -111,10 +112,6 @@ class FrameForm:
             found = np.full(values.shape, complex(nan, nan))
             found.imag = 2 * np.pi * self.frequency_hz * values
         return found.reshape(self.rows, self.columns)
-
-
-def _word(value: float) -> str:
-    return f"{value:.7g}" if np.isfinite(value) else "" if np.isnan(value) else _SATURATED
 
 
 def checked(text: str) -> bytes:

@@ -17,9 +17,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
-from typing import IO, Any, Self, cast
+from typing import IO, Any, cast
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.records import Strict
@@ -54,7 +54,7 @@ class Orders(Strict):
     folder: str
 
 
-class Guardian:
+class Guardian(AbstractContextManager["Guardian", None]):
     """The guardian as its run sees it; use it in a ``with`` statement.
 
     Parameters
@@ -93,9 +93,6 @@ class Guardian:
     def pid(self) -> int:
         """Number of its process."""
         return self._process.pid
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -263,7 +260,10 @@ def main() -> None:
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         if number := getattr(signal, name, None):
             signal.signal(number, signal.SIG_IGN)
-    orders = Orders.model_validate_json(_line())
+    text = b""
+    while not text.endswith(b"\n") and (more := os.read(0, 1)):  # the first line of the input, and no byte more
+        text += more
+    orders = Orders.model_validate_json(text)
     rigs.check(orders.devices)  # imports the drivers, so that nothing has to be imported when it counts
     os.write(1, _ALIVE)
     os.set_blocking(1, False)
@@ -275,14 +275,6 @@ def main() -> None:
         done = {"at": round(time.time(), 3), "reason": reason, "devices": rescue.found, "took_s": took}
         with suppress(OSError), (Path(orders.folder) / REPORT).open("a", encoding="utf-8") as file:
             file.write(json.dumps(done) + "\n")
-
-
-def _line() -> str:
-    """The first line of the input, and no byte more."""
-    text = b""
-    while not text.endswith(b"\n") and (more := os.read(0, 1)):
-        text += more
-    return text.decode()
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, Self, TextIO
 from urllib.parse import parse_qs, urlsplit
 
@@ -203,7 +203,7 @@ class LiveView:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def update(self, sample: Sample) -> None:

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any, Protocol
 
-from sensorgen.core.errors import BadInput, NotInstalled, SensorgenError
+from sensorgen.core.errors import BadInput, SensorgenError, library
 from sensorgen.measure.lab.devices import Clock, DeviceFault, RealClock
 from sensorgen.measure.virtual.plant import Simulator
 
@@ -73,10 +73,7 @@ class SerialPort:
     """
 
     def __init__(self, address: str, baud: int) -> None:
-        try:
-            import serial
-        except ImportError:
-            raise NotInstalled("serial lines need pyserial: pip install 'sensorgen[lab]'") from None
+        serial = library("serial", "serial lines need pyserial: pip install 'sensorgen[lab]'")
         self.address = address
         self._received, self._least = bytearray(), _BLOCK if "://" in address else 1
         with faults(address):
@@ -170,10 +167,7 @@ class VisaPort:
     """
 
     def __init__(self, address: str) -> None:
-        try:
-            import pyvisa
-        except ImportError:
-            raise NotInstalled("VISA needs PyVISA: pip install 'sensorgen[lab]'") from None
+        pyvisa = library("pyvisa", "VISA needs PyVISA: pip install 'sensorgen[lab]'")
         self.address, self._visa = address, pyvisa
         self._failures = partial(faults, repr(address), "no answer from an instrument at {}", pyvisa.errors.Error)
         self._resources: list[Any] = []

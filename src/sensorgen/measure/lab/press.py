@@ -14,6 +14,7 @@ from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import within
 from sensorgen.measure.lab.devices import Clock, DeviceFault, Extension, Identity, Place
 from sensorgen.measure.lab.experiment import AVERAGED_S, DonePress, Experiment, PlannedPress
+from sensorgen.measure.lab.guardian import Guardian
 from sensorgen.measure.lab.live import Controls, Sample
 from sensorgen.measure.lab.recorder import Recorder
 from sensorgen.measure.lab.safety import RAISED_MM, UP_MM, Ended, RunDevices, Sweeps, Watch
@@ -35,19 +36,6 @@ class RunView(Protocol):
 
     def commands(self) -> list[str]:
         """Commands since the last call."""
-
-
-class Alive(Protocol):
-    """Guard that lifts the tip without a sign of life, as :class:`sensorgen.measure.lab.guardian.Guardian`."""
-
-    def arm(self) -> None:
-        """From now on."""
-
-    def disarm(self) -> None:
-        """No longer: the tip is up."""
-
-    def beat(self) -> None:
-        """Tell; raise :class:`DeviceFault` where it has died."""
 
 
 class Paused(Exception):
@@ -103,7 +91,7 @@ class Loop:
     controls: Controls
     watch: Watch
     view: RunView | None = None
-    guardian: Alive | None = None
+    guardian: Guardian | None = None
     predicted: Predicted | None = None
     extension: Extension = field(default=Extension(nan, nan, nan))
     place: Place = field(default=Place(nan, nan, nan, moving=False))

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.arrays import Real
-from sensorgen.core.errors import NotInstalled, OutOfRange, UnknownName
+from sensorgen.core.errors import OutOfRange, UnknownName, library
 from sensorgen.core.records import Line, Strict
 from sensorgen.measure.lab import meters
 from sensorgen.measure.lab.devices import PYMEASURE, Clock, DeviceFault, Identity, Readings, Role, WrongDevice
@@ -46,10 +46,7 @@ def roles() -> dict[str, tuple[Role, Any]]:
     NotInstalled
         PyMeasure is missing.
     """
-    try:
-        from pymeasure import instruments
-    except ImportError:
-        raise NotInstalled("meters of PyMeasure need it: pip install 'sensorgen[pymeasure]'") from None
+    instruments = library("pymeasure.instruments", "meters of PyMeasure need it: pip install 'sensorgen[pymeasure]'")
     by_name: dict[str, tuple[Role, Any]] = {}
     for package in pkgutil.iter_modules(instruments.__path__, f"{instruments.__name__}."):
         with suppress(Exception), warnings.catch_warnings(action="ignore"):  # a maker whose own library is missing

@@ -11,7 +11,7 @@ import mmap
 import os
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -77,14 +77,9 @@ class Appended:
             return os.path.samestat(os.fstat(self._file), self._path.stat())
         return False
 
-    @contextmanager
-    def _faults(self) -> Iterator[None]:
+    def _faults(self) -> AbstractContextManager[None]:
         """Translate errors of the file system to Unwritable."""
-        try:
-            yield
-        except OSError as error:
-            message = f"cannot write to {str(self._path)!r}: {error.strerror or error}; make room on the disk"
-            raise Unwritable(message) from None
+        return files.writing(self._path, advice="; make room on the disk")
 
 
 class SyncedFiles:
@@ -253,14 +248,10 @@ def new_folder(log: Path) -> Path:
     name, k = datetime.now(UTC).strftime("%Y%m%d-%H%M%S"), 1
     while True:
         folder = home(log) / (f"{name}-{k}" if k > 1 else name)
-        try:
+        with files.writing(folder, "cannot make"), suppress(FileExistsError):
             folder.mkdir(parents=True)
-        except FileExistsError:
-            k += 1
-        except OSError as error:
-            raise Unwritable(f"cannot make {str(folder)!r}: {error.strerror or error}") from None
-        else:
             return folder
+        k += 1
 
 
 def alone(folder: Path) -> AbstractContextManager[bool]:

@@ -19,8 +19,9 @@ from sensorgen.measure.lab import experiment as experiments
 from sensorgen.measure.lab import press, recorder, safety
 from sensorgen.measure.lab.devices import Clock, Identity, SelfLifting, SimulatedClock
 from sensorgen.measure.lab.experiment import Choice, DonePress, Experiment, Next, NextPress, PlannedPress
+from sensorgen.measure.lab.guardian import Guardian
 from sensorgen.measure.lab.live import Controls
-from sensorgen.measure.lab.press import Alive, Loop, Paused, Predicted, RunView
+from sensorgen.measure.lab.press import Loop, Paused, Predicted, RunView
 from sensorgen.measure.lab.recorder import Recorder, RunFolder
 from sensorgen.measure.lab.safety import Ended, RunDevices, Watch
 from sensorgen.measure.log import BenchRun, Log, notes
@@ -161,7 +162,7 @@ def design_of(experiment: Experiment, log: Log | None) -> Design | None:
 
 def run(
     experiment: Experiment, *, clock: Clock, log: Log, rig: RunDevices, simulated: bool, view: RunView | None = None,
-    controls: Controls | None = None, guardian: Alive | None = None, next_press: NextPress | None = None,
+    controls: Controls | None = None, guardian: Guardian | None = None, next_press: NextPress | None = None,
     predicted: Predicted | None = None, resume: Path | None = None, confirm: Confirm = lambda *_: True,
     watchdog: bool = True,
 ) -> RunResult:  # fmt: skip
@@ -237,7 +238,7 @@ class _Attempt:
         self.identities: dict[str, Identity] = {}
 
     def result(
-        self, view: RunView | None, controls: Controls, guardian: Alive | None, predicted: Predicted | None
+        self, view: RunView | None, controls: Controls, guardian: Guardian | None, predicted: Predicted | None
     ) -> RunResult:
         """Do it."""
         experiment = self.plan.experiment

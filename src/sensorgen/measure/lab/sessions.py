@@ -3,11 +3,10 @@
 import queue
 import threading
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 
@@ -253,7 +252,7 @@ class Views:
         return [command for view in self._views if isinstance(view, LiveView) for command in view.commands()]
 
 
-class Session:
+class Session(AbstractContextManager["Session", None]):
     """Devices, clock, view and guardian of one run; use it in a ``with`` statement.
 
     Parameters
@@ -319,9 +318,6 @@ class Session:
         rig = rigs.real(experiment.devices, self._clock)
         rig.impedance = Background(rig.impedance)
         return rig
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._stack.close()

@@ -207,8 +207,8 @@ def lockin(recording: "Recording") -> LockIn:
     source = recording.source
     return LockIn(
         tuple(recording.tones_hz.tolist()), recording.counts(), float(recording.time_s[-1]), source.format,
-        source.program, source.lockin, _known(source.rate_hz), _known(source.bandwidth_hz), _known(recording.epoch_s),
-        source.notes,
+        source.program, source.lockin, _known(source.rate_hz), _known(source.bandwidth_hz),
+        _known(recording.clock.epoch_s), source.notes,
     )  # fmt: skip
 
 

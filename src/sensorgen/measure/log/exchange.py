@@ -23,9 +23,10 @@ from pathlib import Path
 from typing import Any
 
 from sensorgen.core import files as store
+from sensorgen.core import yamlfile
 from sensorgen.core.display import escaped, harmless
 from sensorgen.core.document import Part, spreadsheet
-from sensorgen.core.errors import BadInput, MissingValue, UnknownName, Unwritable, within
+from sensorgen.core.errors import BadInput, UnknownName, library, within
 from sensorgen.core.records import shown
 from sensorgen.measure import accuracy, csv_table, lcr
 from sensorgen.measure.csv_table import CsvTable
@@ -88,14 +89,13 @@ def export(log: Log, place: Path) -> int:
         )
     part = store.part_of(place)
     try:
-        (part / "files").mkdir(parents=True)
-        rows = sum(_write_table(log, kind, part / f"{name}.csv", "csv") for kind, name in FILES.items())
-        for file in log.entries(RawFile):
-            shutil.copyfile(files.place(log.files, file), part / "files" / file.uid)
-        part.rename(place)
-        return rows
-    except OSError as error:
-        raise Unwritable(f"cannot export to {str(place)!r}: {error.strerror or error}") from None
+        with store.writing(place, "cannot export to"):
+            (part / "files").mkdir(parents=True)
+            rows = sum(_write_table(log, kind, part / f"{name}.csv", "csv") for kind, name in FILES.items())
+            for file in log.entries(RawFile):
+                shutil.copyfile(files.place(log.files, file), part / "files" / file.uid)
+            part.rename(place)
+            return rows
     finally:
         with suppress(OSError):
             shutil.rmtree(part)
@@ -170,7 +170,7 @@ def parquet(kind: type[Entry], rows: list[Entry]) -> bytes:
 
     Raises
     ------
-    MissingValue
+    NotInstalled
         pyarrow is not installed.
     """
     pyarrow = _pyarrow()
@@ -211,23 +211,15 @@ def from_parquet(path: Path) -> tuple[type[Entry], list[Entry]]:
 
 
 def _pyarrow() -> Any:
-    try:
-        import pyarrow.parquet
-    except ImportError:
-        raise MissingValue("Parquet needs pyarrow: pip install 'sensorgen[parquet]', or export CSV") from None
+    library("pyarrow.parquet", "Parquet needs pyarrow: pip install 'sensorgen[parquet]', or export CSV")
+    import pyarrow
+
     return pyarrow
 
 
 MOST_BYTES = 64_000_000
 THESIS = "thesis Table D.1"
-NAMES = {  # our columns, and names that are recognised
-    "specimen": ("specimen", "design", "name", "name_raw", "sensor", "sample", "written"),
-    "y": ("y", "ry", "r_y", "resistance in y", "resistance y", "y_words"),
-    "z": ("z", "rz", "r_z", "resistance in z", "resistance z", "z_words"),
-    "remark": ("remark", "remarks", "comment", "comments"),
-    "baked": ("baked",),
-    "measured_at": ("measured_at", "date", "time", "measured"),
-}
+NAMES = yamlfile.read(Path(__file__).with_name("columns.yaml"))
 _TRUTH = {"": None, "yes": True, "true": True, "1": True, "baked": True, "no": False, "false": False, "0": False,
           "unbaked": False, "not baked": False}  # fmt: skip
 

@@ -4,12 +4,11 @@ import dataclasses
 import itertools
 import uuid
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 from sensorgen.core import files as store
 from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, UnknownName, within
@@ -73,7 +72,7 @@ def place() -> Path:
     return store.data(PLACE, "log.db")
 
 
-class Log:
+class Log(AbstractContextManager["Log", None]):
     """A log; use it in a ``with`` statement.
 
     Parameters
@@ -98,10 +97,7 @@ class Log:
         self._connection = database.connect(path, create=create)
         self._printed: dict[str, dict[str, Any]] = {}  # batch and design of the latest print, while rows are added
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self._connection.close()
 
     @property
@@ -145,10 +141,6 @@ class Log:
     def batches(self) -> tuple[Batch, ...]:
         """Print beds, the earliest first."""
         return tuple(self.entries(Batch))
-
-    def prints(self, *, specimen: str = "") -> tuple[Print, ...]:
-        """Specimens on print beds with their designs, the earliest first; one specimen's if ``specimen`` is given."""
-        return tuple(self.entries(Print, specimen=specimen) if specimen else self.entries(Print))
 
     def entries(
         self,

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
-from sensorgen.core.errors import BadInput, Unwritable
+from sensorgen.core.errors import BadInput
 from sensorgen.core.records import shown
 from sensorgen.measure.log import files
 from sensorgen.measure.log.chain import Record
@@ -115,7 +115,7 @@ def _opened(place: Path, *, create: bool) -> Iterator[Path]:
     """The folder of a place; an archive is unpacked beside it, and packed again at the end."""
     if not create and not place.exists():
         raise BadInput(f"no folder or .zip at {str(place)!r}; expected what sensorgen log backup or sync wrote")
-    try:
+    with store.writing(place, "cannot use"):
         if place.suffix.lower() == ".zip":
             with tempfile.TemporaryDirectory(prefix="sensorgen-") as folder:
                 yield from _unpacked(place, Path(folder), create=create)
@@ -126,8 +126,6 @@ def _opened(place: Path, *, create: bool) -> Iterator[Path]:
             raise BadInput(f"{str(place)!r} has no folder 'records'; expected what log backup or sync wrote")
         place.mkdir(parents=True, exist_ok=True)
         yield place
-    except OSError as error:
-        raise Unwritable(f"cannot use {str(place)!r}: {error.strerror or error}") from None
 
 
 def _unpacked(place: Path, folder: Path, *, create: bool) -> Iterator[Path]:

@@ -12,8 +12,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from sensorgen.core.document import Part
-from sensorgen.core.errors import BadInput, Unwritable
-from sensorgen.core.files import reading
+from sensorgen.core.errors import BadInput
+from sensorgen.core.files import reading, writing
 from sensorgen.measure.log import chain, files
 from sensorgen.measure.log.entries import KINDS, REFERENCES, ROWS, Anchor, Entry, RawFile, Value, indexed, word
 from sensorgen.measure.log.logbook import Log
@@ -69,11 +69,8 @@ def anchor(log: Log, file: Path) -> Head:
     if not last.head:
         raise BadInput(f"the log {str(log.path)!r} is empty: nothing to anchor")
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    try:
-        with file.open("a", encoding="utf-8") as text:
-            text.write(f"{now} record {last.records} {last.head} {log.path.name}\n")
-    except OSError as error:
-        raise Unwritable(f"cannot write to {str(file)!r}: {error.strerror or error}") from None
+    with writing(file), file.open("a", encoding="utf-8") as text:
+        text.write(f"{now} record {last.records} {last.head} {log.path.name}\n")
     log.add([Anchor(uid=uuid.uuid4().hex, head=last.head, file=file.name)])
     return last
 

@@ -4,7 +4,6 @@ The format of a file is recognised by its first bytes, whatever its name.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,16 +15,13 @@ from sensorgen.core.files import reading
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording import samples
 from sensorgen.measure.recording.rig import Joined, RigLog, joined, joined_all, rig
-from sensorgen.measure.recording.samples import MARKS, MOST_TONES, MOST_VALUES, Recording, RecordingClock, Source
+from sensorgen.measure.recording.samples import MOST_TONES, MOST_VALUES, Recording, RecordingClock, Source
 from sensorgen.measure.recording.spool import MOST_BYTES, FileSpool
 
 if TYPE_CHECKING:
     from sensorgen.measure.readings import Readings
 
-__all__ = [
-    "MARKS", "Joined", "Recording", "RecordingClock", "RigLog", "Source", "joined", "joined_all", "parts", "read",
-    "read_all", "rig",
-]  # fmt: skip
+__all__ = ["Joined", "Recording", "RecordingClock", "RigLog", "Source", "joined", "joined_all", "parts", "rig"]
 
 TIME, STAMP, CLIPPED, VALID = "time_s", "stamp_s", "clipped", "valid"
 
@@ -79,30 +75,6 @@ def _stretch(path: Path, file: "Readings", blocks: list[tuple[Complex, Real]]) -
 
 _HDF = b"\x89HDF\r\n\x1a\n"
 _HDF_PLACES = (0, 512, 1024, 2048)
-
-
-def read(path: Path | str, columns: Mapping[str, str] | None = None) -> Recording:
-    """Read a file of one recording.
-
-    Parameters, errors and formats as :func:`read_all`; several lock-ins are refused as well.
-    """
-    recordings = read_all(path, columns)
-    if len(recordings) > 1:
-        raise BadInput(f"{path}: {len(recordings)} lock-ins; expected one: choose among those of read_all")
-    return recordings[0]
-
-
-def read_all(path: Path | str, columns: Mapping[str, str] | None = None) -> tuple[Recording, ...]:
-    """Read the recordings of all lock-ins in a file of one part; parameters, errors and formats as :func:`parts`.
-
-    Several parts, as after a pause, are refused as well.
-    """
-    first, *more = islice(parts(path, columns), 2)
-    if more:
-        raise BadInput(
-            f"{path}: several parts, with a pause between them or too long for one; expected one: read parts"
-        )
-    return first
 
 
 def parts(path: Path | str, columns: Mapping[str, str] | None = None) -> Iterator[tuple[Recording, ...]]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.core.errors import BadInput, MissingValue, within
+from sensorgen.core.errors import BadInput, library, within
 from sensorgen.measure.recording.matfive import Split, characters
 from sensorgen.measure.recording.spool import FileSpool
 
@@ -39,16 +39,13 @@ def variables(path: Path, wanted: Collection[str], spool: FileSpool) -> dict[str
 
     Raises
     ------
-    MissingValue
+    NotInstalled
         h5py is not installed.
     BadInput
         A file that is damaged, has links, has other data than numbers and text, or unpacks to more than memory and
         disk should hold.
     """
-    try:
-        import h5py
-    except ImportError:
-        raise MissingValue("HDF5 and MATLAB 7.3 files need h5py: pip install h5py, or save with -v7") from None
+    h5py = library("h5py", "HDF5 and MATLAB 7.3 files need h5py: pip install h5py, or save with -v7")
     try:
         with h5py.File(path, "r", rdcc_nbytes=_MOST_CHUNK) as file:
             reader = _Reader(file, spool)

@@ -442,8 +442,8 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
     BadInput
         Too few samples or rows; no response to the force, and no common clock to assume instead.
     """
-    common_clock = all(np.isfinite(one.epoch_s) for one in recordings)
-    times = [one.real_s() if common_clock else one.time_s for one in recordings]
+    common_clock = all(np.isfinite(one.clock.epoch_s) for one in recordings)
+    times = [one.clock.real_s(one.time_s) if common_clock else one.time_s for one in recordings]
     limit_s = min(within_s, _STAMPED_S) if common_clock and rig.stamped else np.inf
     offset = _best(recordings, times, rig, min(within_s, limit_s))
     if offset.by_chance or abs(offset.offset_s) > limit_s:  # its refinement looks beyond

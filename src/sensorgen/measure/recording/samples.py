@@ -18,19 +18,15 @@ from numpy.typing import NDArray
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
 
-MARKS = {
-    "zero": "a tone is exactly 0 + 0j: the instrument skipped a block",
-    "missing": "a tone is no finite number, or beyond any impedance (1e30 ohm)",
-    "transient": "the demodulator was still starting up",
-    "clipped": "the instrument's input was beyond its range",
-    "invalid": "the file marks the sample as invalid",
-    "gap": "first sample after samples that were lost",
-    "reversed stamp": "the time stamp is earlier than the one before",
-    "repeated stamp": "the time stamp is the same as the one before",
-    "no stamp": "the time stamp is not a finite number",
-    "rig error": "the rig reported an error, or nothing",
-}
-"""Marks of samples, and their meanings."""
+MARKS = (
+    "zero", "missing", "transient", "clipped", "invalid", "gap", "reversed stamp", "repeated stamp", "no stamp",
+    "rig error",
+)  # fmt: skip
+"""Marks of samples."""
+# zero: a tone is exactly 0 + 0j, as where the instrument skipped a block; missing: a tone is no finite number, or
+# beyond any impedance (1e30 ohm); transient: the demodulator was still starting up; clipped: the input was beyond its
+# range; invalid: the file says so; gap: the first after samples that were lost; stamps: earlier than the one before,
+# the same, no finite number; rig error: the rig reported an error, or nothing.
 
 HARMLESS = frozenset({"gap", "reversed stamp", "repeated stamp", "no stamp"})
 """Marks that leave a sample valid: the rebuilt clock corrects them."""
@@ -159,15 +155,6 @@ class Recording:
         source = replace(source, rate_hz=rate_hz(by.time_s), notes=source.notes + by.notes)
         every = blank(count) | by.marks | sifted(impedance_ohm) | marks
         return cls(by.time_s, tones_hz, impedance_ohm, every, by.clock, source)
-
-    @property
-    def epoch_s(self) -> float:
-        """Real time at ``time_s`` = 0, in seconds since 1970; nan if unknown [s]."""
-        return self.clock.epoch_s
-
-    def real_s(self) -> Real:
-        """Seconds since 1970 of every sample; nan if unknown [s]."""
-        return self.clock.real_s(self.time_s)
 
     def counts(self) -> dict[str, int]:
         """Number of samples, of valid samples, and of samples with each mark."""

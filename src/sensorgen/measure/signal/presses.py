@@ -281,10 +281,9 @@ class Pairs:
 
 
 def pairs(
-    time_s: Real, impedance_ohm: Complex, valid: Mask, presses: list[PressTimes], force_n: Real, position_mm: Real,
-    window_s: float = WINDOW_S, guard_s: float = GUARD_S,
-) -> Pairs:  # fmt: skip
-    """Average the readings before and under each press.
+    time_s: Real, impedance_ohm: Complex, valid: Mask, presses: list[PressTimes], force_n: Real, position_mm: Real
+) -> Pairs:
+    """Average the readings before and under each press, over a second each, apart from the ramps.
 
     Parameters
     ----------
@@ -298,10 +297,6 @@ def pairs(
         As :func:`by_force` or :func:`by_readings` returns them.
     force_n, position_mm : (n,) array
         Force and position; nan where unknown [N], [mm].
-    window_s : float
-        Length of the means, which end ``guard_s`` before the press and ``guard_s`` before its end [s].
-    guard_s : float
-        Distance of the windows from the ramps [s].
 
     Raises
     ------
@@ -315,9 +310,9 @@ def pairs(
     """
     rows, left_out, last_end = [], [], -np.inf
     for k, press in enumerate(presses, 1):
-        until, end = press.start_s - guard_s, press.end_s - guard_s
-        before = _within(time_s, valid, max(until - window_s, last_end + guard_s), until)
-        under = _within(time_s, valid, max(end - window_s, press.start_s + guard_s), end)
+        until, end = press.start_s - GUARD_S, press.end_s - GUARD_S
+        before = _within(time_s, valid, max(until - WINDOW_S, last_end + GUARD_S), until)
+        under = _within(time_s, valid, max(end - WINDOW_S, press.start_s + GUARD_S), end)
         last_end = press.end_s
         if min(len(before), len(under)) < _LEAST:
             counts = f"{len(before)} readings before and {len(under)} under it"
@@ -331,12 +326,12 @@ def pairs(
         rows.append((
             press.start_s, _known_mean(force_n[under]), _known_mean(position_mm[under]), first.mean(axis=0),
             second.mean(axis=0), re + 1j * im, (len(before), len(under)),
-            *_course(time_s, force_n, press.start_s, end - window_s / 2),
+            *_course(time_s, force_n, press.start_s, end - WINDOW_S / 2),
         ))  # fmt: skip
     if not rows:
         raise BadInput(
-            f"{len(presses)} presses, none with {_LEAST} readings in the {window_s:g} s before it and before its end; "
-            f"expected some: record {_LEAST / window_s:g} readings a second or more"
+            f"{len(presses)} presses, none with {_LEAST} readings in the {WINDOW_S:g} s before it and before its end; "
+            f"expected some: record {_LEAST / WINDOW_S:g} readings a second or more"
         )
     start, force, position, unloaded, loaded, error, samples, peak, hold = map(np.array, zip(*rows, strict=True))
     return Pairs(

@@ -168,28 +168,18 @@ class Evidence:
         Readings along an electrode and between the electrodes; inf for an overload, empty if not measured [ohm].
     expected_ohm : float
         Expected resistance of an electrode [ohm]; nan if unknown.
-    shape, remark, axes, plate, defects : str
-        For groups.
-    baked : bool or None
-        For groups; None if unknown.
-    film_mm : float or None
-        For groups [mm].
     touching : bool
         Whether the electrodes touch as printed of this design: such a short is no fault of the print.
+    plate : str
+        On which it was printed; "" if unknown.
     """
 
     name: str
     ry_ohm: tuple[float, ...] = ()
     rz_ohm: tuple[float, ...] = ()
     expected_ohm: float = nan
-    shape: str = ""
-    film_mm: float | None = None
-    remark: str = ""
     touching: bool = False
-    axes: str = ""
     plate: str = ""
-    baked: bool | None = None
-    defects: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -382,7 +372,7 @@ class Group:
     words: Mapping[str, int]
 
 
-Judged = tuple[Evidence, SignalVerdict]
+Judged = tuple[tuple[Hashable, ...], Evidence, SignalVerdict]
 
 
 def share(count: int, total: int, confidence: float = CONFIDENCE, plates: Sequence[tuple[int, int]] = ()) -> CountShare:
@@ -434,40 +424,31 @@ def _independent(count: int, total: int, confidence: float, plates: Sequence[tup
     return min(float(total), share_ * (1 - share_) / variance / wider) if variance else float(total)
 
 
-def groups(
-    judged: Iterable[Judged],
-    by: Callable[[Evidence], tuple[Hashable, ...]],
-    confidence: float = CONFIDENCE,
-    order: float = ORDER,
-) -> list[Group]:
+def groups(judged: Iterable[Judged], order: float = ORDER) -> list[Group]:
     """Yield of every group, by key.
 
     Parameters
     ----------
-    judged : iterable of (Evidence, SignalVerdict)
-        Specimens.
-    by : function
-        Key of a specimen, as ``lambda of: (of.shape, of.film_mm)``.
-    confidence : float
-        Confidence of the intervals [-].
+    judged : iterable of (tuple, Evidence, SignalVerdict)
+        Specimens, each with its key, as ("tri", 0.1).
     order : float
         R_Z over R_Y up to which a specimen counts as shorted [-].
     """
     members: dict[tuple[Hashable, ...], tuple[_Counts, array[float]]] = {}
-    for of, v in judged:
-        counts, ratios = members.setdefault(by(of), (Counter(), array("d")))
+    for key, of, v in judged:
+        counts, ratios = members.setdefault(key, (Counter(), array("d")))
         counts[of.plate, v.word, of.touching, None if isnan(v.ratio) else v.ratio <= order] += 1
         if not isnan(v.ratio):
             ratios.append(v.ratio)
     keys = sorted(members, key=lambda key: [(k is None, str(k)) for k in key])
-    return [_group(key, *members[key], confidence) for key in keys]
+    return [_group(key, *members[key]) for key in keys]
 
 
 _Plates = Counter[tuple[str, bool]]
 _Counts = Counter[tuple[str, str, bool, bool | None]]  # specimens by plate, verdict, touching, and a ratio of one order
 
 
-def _group(key: tuple[Hashable, ...], counts: _Counts, ratios: "array[float]", confidence: float) -> Group:
+def _group(key: tuple[Hashable, ...], counts: _Counts, ratios: "array[float]") -> Group:
     words, known, both = Counter[str](), _Plates(), _Plates()
     for (plate, word, touching, low), count in counts.items():
         words[word] += count
@@ -475,17 +456,16 @@ def _group(key: tuple[Hashable, ...], counts: _Counts, ratios: "array[float]", c
             known[plate, word == "intact"] += count
         if not touching and low is not None:
             both[plate, low] += count
-    intact, shorted = (_shared(such, confidence) for such in (known, both))
-    return Group(key, intact, shorted, median(ratios) if ratios else nan, words)
+    return Group(key, _shared(known), _shared(both), median(ratios) if ratios else nan, words)
 
 
-def _shared(such: _Plates, confidence: float) -> CountShare:
+def _shared(such: _Plates) -> CountShare:
     """A share by plates; a specimen whose plate is not known is a plate of its own."""
     count = sum(n for (_, yes), n in such.items() if yes)
     named = {plate for plate, _ in such if plate}
     plates = [(such[plate, True], such[plate, True] + such[plate, False]) for plate in sorted(named)]
     plates += [(1, 1)] * such["", True] + [(0, 1)] * such["", False]
-    return share(count, such.total(), confidence, plates)
+    return share(count, such.total(), plates=plates)
 
 
 def dependence(of: Sequence[Group]) -> float:

@@ -159,9 +159,7 @@ class PhasorMeter:
         """End the measurement."""
         self._windows = None
 
-    def close(self) -> None:
-        """End the measurement."""
-        self._windows = None
+    close = stop
 
     def _measured(self, impedance: Complex) -> tuple[Complex, bool]:
         """One window's impedance with noise, and whether it is clipped."""

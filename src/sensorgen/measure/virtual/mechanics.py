@@ -4,11 +4,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from math import copysign, exp, inf, sqrt
-from typing import Annotated, Any, Literal, Protocol
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from sensorgen.core import yamlfile
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.records import Strict
@@ -28,58 +30,15 @@ class Fault:
         Which simulator.
     sets : str
         Value of its attribute ``fault``.
-    about : str
-        What happens, in one line.
     """
 
     strikes: Strikes
     sets: str
-    about: str
 
 
-_LINES = {
-    "silent": "obeys, but sends no answers",
-    "hung": "neither answers nor acts; what was set before goes on",
-    "garbage": "answers with bytes that mean nothing",
-    "identity": "says that it is another device",
-    "truncated": "loses the second half of each answer",
-    "cut": "its cable is pulled out: every message fails",
-    "error": "reports an error of its own",
-    "stuck": "accepts set points and ignores them",
-}
-BY_DEVICE: dict[Strikes, dict[str, str]] = {
-    "actuator": _LINES
-    | {
-        "error": "switches its motor off and sets the error bit of its status",
-        "echo": "sends each command back before its answer",
-        "runaway": "pushes with the largest force that its limit allows",
-    },
-    "stage": _LINES,
-    "lcr-meter": _LINES | {"overload": "is beyond its range"},
-    "multimeter": _LINES | {"overload": "is beyond its range"},
-    "analyser": {
-        "unplugged": "its cable is pulled out",
-        "hung": "sends no more samples",
-        "data loss": "loses samples between two blocks",
-        "clipped": "its inputs saturate",
-        "nan": "sends no numbers",
-        "silent": "measures zero volt",
-        "generator off": "puts out no signal",
-        "in use": "is held by another program",
-        "wrong device": "says that it is another device",
-    },
-    "rig": {
-        "cable out": "the specimen's cable is pulled out: an open circuit",
-        "power loss": "the actuator's motor gives no force; weight and friction remain",
-        "jammed": "the piston moves no more",
-        "stage moves": "the stage moves along the specimen by itself",
-        "short": "1 kohm between the electrodes, as long as the force is below 2 N",
-    },
-}
-FAULTS: Mapping[str, Fault] = {
-    f"{device} {name}": Fault(device, name, about) for device, own in BY_DEVICE.items() for name, about in own.items()
-}
-"""All of them, by name: the simulator and what happens to it."""
+BY_DEVICE: dict[Strikes, dict[str, str]] = yamlfile.read(Path(__file__).with_name("faults.yaml"))  # type: ignore[assignment]
+FAULTS: Mapping[str, Fault] = {f"{of} {name}": Fault(of, name) for of, own in BY_DEVICE.items() for name in own}
+"""All of them, by name."""
 
 
 class Planted(Strict):
@@ -111,18 +70,6 @@ class Planted(Strict):
         return self
 
 
-class Faulty(Protocol):
-    """A simulator that faults strike.
-
-    Attributes
-    ----------
-    fault : str
-        Name of its fault, "" for none.
-    """
-
-    fault: str
-
-
 class FaultSchedule:
     """Faults that wait for their time, and those that last.
 
@@ -135,10 +82,10 @@ class FaultSchedule:
     def __init__(self, planted: Iterable[Planted]) -> None:
         self._waiting = list(planted)
         self._lasting: list[tuple[float, Fault]] = []
-        self._targets: dict[str, Faulty] = {}
+        self._targets: dict[str, Any] = {}
 
-    def attach(self, strikes: Strikes, simulator: Faulty) -> None:
-        """Name the simulator that faults of a kind of device strike."""
+    def attach(self, strikes: Strikes, simulator: Any) -> None:
+        """Name the simulator that faults of a kind of device strike: they set its attribute ``fault``."""
         self._targets[strikes] = simulator
 
     def update(self, time_s: float, force_n: float) -> None:

@@ -122,9 +122,6 @@ class SimulatedLcrMeter(_Instrument):
 class SimulatedMultimeter(_Instrument):
     """A 34401A or a Keithley 2000."""
 
-    def __init__(self, plant: Plant, model: str = "hp-34401a") -> None:
-        super().__init__(plant, model)
-
     def _own(self, command: str, _: str, time_s: float, /) -> bool:
         wires = {"MEAS:RES?": 2, "MEAS:FRES?": 4}.get(command)
         if wires:
