@@ -73,8 +73,8 @@ coefficients, which contain that, from the reference as it is. Both are smoothed
 Elements flicker where a fiftieth of their samples or more jump to another value: in the first validation 104 of 193.
 
 A state of 100 s was found on these recordings by leaving one out: that column is not independent of what it is tested
-on. The law that the others choose is. In the last table nothing of the recording that is left out is used but its
-first unloaded 20 s, and the offset of its reference."""
+on. The law that the others choose is. The law and its intervals take nothing from the recording that is left out but
+its first unloaded 20 s; its clock's offset and the choice of elements, dead, frozen or flickering, are of all of it."""
 
 
 def fetch(folder):

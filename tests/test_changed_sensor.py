@@ -237,6 +237,26 @@ def test_a_session_near_an_end_alone_widens_the_interval_of_the_force(model, spe
     assert (together.position_90_m == alone.position_90_m).all()
 
 
+def test_a_few_readings_change_no_others_of_their_session(model, specimens):
+    """Two readings far below their rest move none; two presses far from all others are where they are."""
+    _, _, posterior = specimens[1]
+    together = Inverter(model, posterior, force_limit_n=LIMIT_N, session=True)
+    force = np.append(np.linspace(0.5, 5, 1000), [2.0, 4.0])
+    noise = NOISE * np.random.default_rng(0).normal(size=(len(force), 2, len(TONES_HZ)))
+    all_over = (
+        model.ratio(posterior.at, unknown(force, np.linspace(0.01, 0.09, len(force)))) + noise[:, 0] + 1j * noise[:, 1]
+    )
+    below = np.vstack([all_over, -all_over[-2:]])
+    sound = together.batch(all_over).force_90_n[:1000]
+    assert together.batch(below).force_90_n[:1000] == pytest.approx(sound, abs=0.02)
+    far = np.append(np.linspace(0.0, 0.008, 1000), [0.08, 0.08])
+    near = model.ratio(posterior.at, unknown(force, far)) + noise[:, 0] + 1j * noise[:, 1]
+    found = together.batch(near)
+    assert np.isfinite(found.force_90_n).all()
+    assert (found.force_90_n[-2:, 0] <= force[-2:]).all()
+    assert (force[-2:] <= found.force_90_n[-2:, 1]).all()
+
+
 @pytest.mark.parametrize("name", [pytest.param("sound", marks=pytest.mark.nightly), "1.4 x softer (aged)"])
 def test_a_recheck_narrows_the_interval_again(model, specimens, name):
     widths, held = [], []

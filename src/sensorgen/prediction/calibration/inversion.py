@@ -36,6 +36,8 @@ _CONFINED = 0.2  # probability, before any reading, that a session's presses are
 _STRETCHES = np.array([  # such parts, start and end over the length: places share errors, so that none is shorter
     (0.0, 1.0), *((start, start + of) for of in (0.1, 0.2, 0.4, 0.6, 0.8) for start in np.arange(0, 1.01 - of, 0.05)),
 ])  # fmt: skip
+_APART = 0.02  # share of a session's presses that are anywhere, whatever the others are on: a guess
+_INDEPENDENT = 100.0  # readings at most that tell of a stretch: samples of one press, and one calibration, err alike
 _RARE = 0.005  # probability of a load at rest below which it is left out
 _BELOW = 0.3  # share of what lies outside an interval that is below it, where that something is allowed for
 _MORE = 3.2905267314919255  # standard deviations that noise exceeds once in a thousand
@@ -211,7 +213,7 @@ class Inverter:
         self._fall = weighted / np.sqrt(fall @ weighted)
         by_load = parts(model.ratio(posterior.at, at_rest))
         self._by_load = by_load - by_load[0]
-        self._stretches = _stretches(_edges(self.position_m) / self._length)
+        self._stretches = (1 - _APART) * _stretches(_edges(self.position_m) / self._length) + _APART
 
     def batch(self, ratio: Complex, rest_age_s: Real | None = None, changed: Mask | None = None) -> InvertedPresses:
         """Presses behind readings.
@@ -238,21 +240,30 @@ class Inverter:
         anywhere = np.eye(1, len(_STRETCHES)).repeat(len(ratio), 0)
         readings = _Readings(parts(ratio), anywhere, np.ones(1), self._by_load[:1])
         session = self._session and len(ratio) > 1
-        if session and (below > 0).any():
-            readings = self._with_rest(readings, below)
+        if session:
+            readings = self._with_rest(readings, below, rest_age_s)
         presses = self._inverted(readings, measured)
         if session:
             chance = _stretch_probabilities(presses)
-            if chance[0] < 1 - _CONFINED:
-                factors = chance / np.maximum(presses.stretches, 1e-300)
+            if chance[0] < (1 - _CONFINED) * (1 - 1e-9):  # else nothing is told
+                factors = chance / presses.stretches
                 presses = self._inverted(readings._replace(on_stretch=factors), measured)
         presses.below[:] = below
         stale = np.zeros(len(ratio), bool) if rest_age_s is None else ~(rest_age_s <= STALE_S)
         return self._judged(presses, stale, np.zeros(len(ratio), bool) if changed is None else changed)
 
-    def _with_rest(self, readings: _Readings, below: Real) -> _Readings:
-        """Readings with the loads at rest that those below it show."""
-        chance = load_probabilities(below, -self._by_load @ self._fall, _LOADED)
+    def _with_rest(self, readings: _Readings, below: Real, rest_age_s: Real | None) -> _Readings:
+        """Readings with the loads at rest that those below it show, where that is one.
+
+        Readings farther below, and loads that would put some there, are left to the verdict.
+        """
+        several = rest_age_s is not None and (np.diff(rest_age_s) < 0).any()
+        if several or not (below > 0).any():
+            return readings
+        by_load = -self._by_load @ self._fall
+        chance = load_probabilities(below[below < _BELOW_REST], by_load, _LOADED) * (by_load < _BELOW_REST)
+        chance[0] = max(chance[0], 1e-300)
+        chance /= chance.sum()
         if chance[0] >= 1 - _LOADED:
             return readings
         order = np.argsort(chance)[np.sort(chance) > _RARE]
@@ -432,7 +443,7 @@ def _stretches(edges: Real) -> Real:
 def _stretch_probabilities(presses: InvertedPresses) -> Real:
     """Probabilities that the presses of a session are on all of the sensor, and on each stretch (s,)."""
     fits = presses.chi2 <= chi2_limit(2 * presses.tones - 2)
-    ln = np.log(np.maximum(presses.stretches[fits], 1e-300)).sum(0)
+    ln = np.log(presses.stretches[fits]).sum(0) * min(1.0, _INDEPENDENT / max(fits.sum(), 1))
     before = np.append(1 - _CONFINED, np.full(len(ln) - 1, _CONFINED / (len(ln) - 1)))
     chance = before * np.exp(ln - ln.max())
     return np.asarray(chance / chance.sum())

@@ -120,7 +120,7 @@ LOADS_N = np.array([0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0])  # that 
 _USUAL_N = 1.0  # standard deviation of such a load: a guess
 _BORDERS = np.arange(-4.0, 8.1, 0.25)  # of how far readings lie below that at rest, in standard deviations
 _SHARES = 0.7 ** np.arange(14)  # of the readings
-_OUTLIERS = 1e-3  # readings expected between two borders for other reasons
+_OUTLIERS = 0.01  # share of the readings that may lie anywhere for other reasons
 
 
 def load_probabilities(below: Real, by_load: Real, loaded: float) -> Real:
@@ -146,7 +146,7 @@ def load_probabilities(below: Real, by_load: Real, loaded: float) -> Real:
     away = middle - np.minimum(by_load, middle[-1])[:, None]
     presses, zeros = width * ndtr(-away), width * np.exp(-(away**2) / 2) / np.sqrt(2 * np.pi)
     shares = count.sum() * np.append(0.0, _SHARES)[:, None, None]
-    expected = shares[:, None] * zeros + shares[1:] * presses + _OUTLIERS
+    expected = shares[:, None] * zeros + shares[1:] * presses + _OUTLIERS * max(count.sum(), 1) / len(count)
     ln = (count * np.log(expected) - expected).sum(-1)
     none_or_some = np.where(shares, 1 / len(_SHARES), 1.0)  # as probable
     evidence = (none_or_some * np.exp(ln - ln.max())).sum((0, 1))
