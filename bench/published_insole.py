@@ -97,7 +97,7 @@ def smoothed(values, share=SMOOTH):
 
 
 def high(values, seconds, each_s):
-    """What is faster than some seconds, without delay."""
+    """Fast part of a signal, of less than some seconds, without delay."""
     share = each_s / seconds
     return values - (smoothed(values, share) + smoothed(values[::-1], share)[::-1]) / 2
 

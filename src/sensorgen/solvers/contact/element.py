@@ -319,9 +319,8 @@ class Elements:
         p = inner.pressure @ table.pressures.T
         j, rate = determinant(h) / self._volumes[:, None], cofactor(h) / self._volumes[:, None, None, None]
         t, hoops = self._hoops(u, inner, every) if self.mesh.turned else (1.0, None)
-        stress = (w * mu)[..., None, None] * (h @ self._metric[:, None]) + (w * (p * t - mu / j))[
-            ..., None, None
-        ] * rate
+        shear, hydro = (each[..., None, None] for each in (w * mu, w * (p * t - mu / j)))
+        stress = shear * (h @ self._metric[:, None]) + hydro * rate
         forces = (stress.transpose(0, 2, 1, 3).reshape(m * d, -1) @ table.flat).reshape(m, d, n)
         if hoops is not None:
             forces[:, 0] += np.matmul((w * (mu * t + p * j - mu / t))[:, None], hoops)[:, 0]

@@ -224,32 +224,32 @@ class Problem:
     def _descended(self, state: State, by: Stiffness, enough: float, *, own: bool) -> tuple[State | None, bool]:
         """State as far as one stiffness serves, and whether it is balanced; None where no step is possible.
 
-        A state's ``own`` stiffness serves at least once; that of another one, while each step leaves much less.
+        A state's ``own`` stiffness serves at least once; that of another one, while each step leaves less.
         """
         scale = max(state.pressure_pa, _LEAST * self.penalty_pa) * np.abs(self.free.T @ self.load).max()
-        rest, elements = self._residual(state, by.elements)
+        rest, unbalanced = self._residual(state, by.elements)
         worst, fast = np.abs(rest).max(), True
-        while not (worst < enough * scale and elements.imbalance < enough):
-            after = self._moved(state, by, rest, elements) if fast else None
+        while not (worst < enough * scale and unbalanced.imbalance < enough):
+            after = self._moved(state, by, rest, unbalanced) if fast else None
             if after is None:
                 return None if own else state, False
-            (rest, elements), before = self._residual(after, by.elements), worst
+            (rest, unbalanced), before = self._residual(after, by.elements), worst
             worst = np.abs(rest).max()
             if not (own or worst < before):
                 return state, False
             moved, own, fast = np.abs(after.u_m - state.u_m).max(), False, worst < _SLOW * before
             state = after
-            if moved <= _STILL * np.abs(state.u_m).max() and elements.imbalance < _NEARLY:
+            if moved <= _STILL * np.abs(state.u_m).max() and unbalanced.imbalance < _NEARLY:
                 break
         return state, True
 
-    def _moved(self, state: State, by: Stiffness, rest: Real, elements: Unbalanced) -> State | None:
+    def _moved(self, state: State, by: Stiffness, rest: Real, unbalanced: Unbalanced) -> State | None:
         """State after a step of Newton's method, or so much of it that no element is squeezed too far; None if none."""
         step = self.solver(by.whole, -rest) if np.isfinite(rest).all() else None
         if step is None:
             return None
         du = self.free @ step
-        inside = by.elements.inner_step(elements, du[self.elements.freedoms])
+        inside = by.elements.inner_step(unbalanced, du[self.elements.freedoms])
         for share in _SHARES:
             u, inner = state.u_m + share * du, state.inner.moved(inside, share)
             if self.elements.volume_ratio(u, inner).min() > _LEAST_J:
