@@ -182,7 +182,7 @@ class ArraySession:
     def recovery(self, tau_s: float) -> tuple[Real, Real]:
         """Reading above the tare that an earlier load left, and its error, (k, 1): as it decays, and is below after.
 
-        It decays as the law's memory does, in 100 s without one; seconds do not tell the time constant: half or double
+        It decays as the law's memory does, in 100 s without one. A rest of seconds leaves that time open: half or double
         of it is in the error.
         """
         rate, error = self.falls
@@ -228,7 +228,7 @@ def flickering(time_s: Real, reading: Real) -> Mask:
     """Elements that in more than a hundredth of the frames jump and come back within a tenth of a second, (n,).
 
     No load of a foot is that short: a loose wire is, or a multiplexer that shows another element. Frames that are
-    farther apart do not tell.
+    farther apart show neither.
 
     Parameters
     ----------

@@ -195,10 +195,10 @@ def _law(sums: Sequence[elements.Sums], form: elements.LawForm, scale: float) ->
 
 
 def chosen(sessions: Sequence[elements.ArraySession]) -> elements.LawForm:
-    """Form of the law that leaves the least error in sessions left out; a term more has to lower it by 2 %.
+    """Form of the law that leaves the least error in sessions left out; each term of the past has to lower it by 2 %.
 
     Memory in time and play, which is alike at all speeds, are chosen together: either is taken for the other where it
-    comes first. Then the powers, then a drift of the gain; of one session a cubic.
+    comes first. Then the powers, then a drift of the gain, by 2 % too; of one session a cubic.
     """
     best = elements.LawForm()
     if len(sessions) < 2:
@@ -206,7 +206,7 @@ def chosen(sessions: Sequence[elements.ArraySession]) -> elements.LawForm:
     least = float("inf")
     for change in ("past", "powers", "drift"):
         for form in _changed(best, change):
-            terms = form.powers + bool(form.tau_s) + bool(form.play) + form.drift
+            terms = bool(form.tau_s) + bool(form.play) + form.drift
             cost = _left_out(sessions, form) * (1 + _EARNED) ** terms
             if cost < least:
                 best, least = form, cost
