@@ -96,7 +96,7 @@ class Case:
         return roots.force_n, roots.choice(self.sensor.length_m)
 
     def forward(self):
-        self.estimator._forward.log_impedance(self.force, self.position)
+        self.sensor.impedance(self.tones, self.force[:, None], self.position[:, None])
         return self.force, self.position
 
     def bound(self):

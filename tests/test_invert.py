@@ -16,7 +16,6 @@ from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.inverse import answers
 from sensorgen.prediction.inverse.estimator import Estimator, Prior
-from sensorgen.prediction.inverse.forward import Forward
 from sensorgen.prediction.inverse.verdict import Status, chi2_limit
 from sensorgen.prediction.query import TONES_HZ
 
@@ -82,18 +81,6 @@ def bound(sensor, tones, force, position, noise=NOISE):
     z, by_force, by_position = sensor.response(tones, force, position)
     j = np.stack([by_force / abs(z), by_position / abs(z)], -1) / noise
     return np.linalg.inv((j.conj().T @ j).real)
-
-
-@pytest.mark.parametrize("name", ["open", "short", "resistor", "plate"])
-def test_the_forward_model_is_the_sensor(name):
-    ends = {"open": "open", "short": "short", "resistor": 5e4, "plate": "open"}
-    sensor = PLATE if name == "plate" else everything(far_end=ends[name])
-    force, position = presses(300)
-    position[:4] = 0.0, 0.1, 0.003, 0.098
-    got = np.exp(Forward(sensor, TONES).log_impedance(force, position))
-    want = readings(sensor, TONES, force, position)
-    assert abs(got / want - 1).max() < 1e-13
-    assert abs(got.real / want.real - 1).max() < 1e-11
 
 
 @pytest.mark.parametrize("name", SENSORS)

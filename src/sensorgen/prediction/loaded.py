@@ -18,6 +18,7 @@ from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.core.units import M_PER_MM, frequency_text, si
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
+from sensorgen.models import refusal
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
@@ -160,13 +161,7 @@ def check_presses(sensor: Sensor, force_n: ArrayLike, position_m: ArrayLike) -> 
 
 def _refusal(sensor: Sensor, force_n: float, position_m: float) -> str:
     """Why a press has no answer, "" if it has one."""
-    try:
-        stress = sensor.stress_pa(force_n, position_m)
-        sensor.compression.capacitive_strain(stress)
-        sensor.check_tracks(stress)
-    except OutOfRange as error:
-        return str(error).partition(": press less")[0]
-    return ""
+    return (refusal(OutOfRange, sensor.check_press, force_n, position_m) or "").partition(": press less")[0]
 
 
 def positions_mm(design: Design) -> tuple[float, ...]:

@@ -18,7 +18,7 @@ from sensorgen.models import line
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import bodies
 from sensorgen.prediction.inference import NORMAL_90, Parameter, Samples, parts, slopes
-from sensorgen.prediction.inverse.forward import Forward, tones
+from sensorgen.prediction.inverse.forward import bearable_n, tones
 from sensorgen.prediction.query import TONES_HZ, Query, Tip
 from sensorgen.prediction.sensor_model import SensorModel, sensor_model
 
@@ -188,7 +188,7 @@ class SpecimenModel:
     def most_pa(self) -> float:
         """Pressure up to which the law of compression reaches; beyond, the rise goes on in proportion [Pa]."""
         sensor = self.sensor
-        return Forward(sensor, self.frequency_hz).force_limit_n(_FAR_N) / (sensor.width_m * sensor.tip_m / 2)
+        return bearable_n(sensor, _FAR_N) / (sensor.width_m * sensor.tip_m / 2)
 
     @cached_property
     def _shapes(self) -> Real:

@@ -16,7 +16,7 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import inference
 from sensorgen.prediction.inference import NORMAL_90, Index, LocalFit, Samples, parts
-from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Forward, Local, ResponseTable
+from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Local, ResponseTable, bearable_n, log_impedance, tones
 from sensorgen.prediction.inverse.verdict import PAIR, Status, covariance, statuses
 
 LOOSE, TIGHT = 0.2, 0.01  # share of the residual that a step still removes when a sample is done (Bates and Watts 1981)
@@ -330,10 +330,9 @@ class Estimator:
         prior: Prior | None = None,
         force_limit_n: float = FORCE_LIMIT_N,
     ) -> None:
-        self._forward = Forward(sensor, frequency_hz)
-        self.frequency_hz, self.prior = self._forward.frequency_hz, prior
+        self._sensor, self.frequency_hz, self.prior = sensor, tones(frequency_hz), prior
         self._sigma = _noise(noise, len(self.frequency_hz))
-        self._table = ResponseTable(self._forward, self._forward.force_limit_n(force_limit_n))
+        self._table = ResponseTable(sensor, self.frequency_hz, bearable_n(sensor, force_limit_n))
         self.scale = self._table.scale
         rival, gap = self._table.rivals(self._sigma)
         self._rival = np.where(gap < _RIVAL, rival, -1)
@@ -422,7 +421,7 @@ class Estimator:
     def _exact(self, press: Real) -> Local:
         """The exact response; its derivatives from the table."""
         force, position = (press * self.scale).T
-        exact = parts(self._forward.log_impedance(force, np.minimum(position, self.scale[1])))
+        exact = parts(log_impedance(self._sensor, self.frequency_hz, force, np.minimum(position, self.scale[1])))
         return Local(exact, self._table.at(press).slope)
 
     def _in_si(

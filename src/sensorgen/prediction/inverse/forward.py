@@ -1,4 +1,4 @@
-"""Forward model of one sensor at fixed frequencies: exact, and as a table in which responses are looked up.
+"""Forward model of one sensor at fixed frequencies, as a table in which responses are looked up.
 
 In the table everything is scaled: force by its limit, position by the sensor's length, so that a press is a point of
 the unit square. The table only has to lead to the solution; the exact model has the last word.
@@ -11,80 +11,43 @@ from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.models import line, refusal
+from sensorgen.models import refusal
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.inference import Index, parts
-from sensorgen.solvers.line.inputs import far_load
 
 FORCE_LIMIT_N = 13.0  # the rig's largest force, thesis chapter 6
 _HALVINGS = 40
 
 
-class Forward:
-    """Exact ln Z of a sensor at its frequencies, for one press per row.
+def log_impedance(sensor: Sensor, frequency_hz: Real, force_n: Real, position_m: Real) -> Complex:
+    """Natural logarithm of Z/ohm for one press per row, (n, n_tones); errors as :meth:`Sensor.impedance`."""
+    return np.log(sensor.impedance(frequency_hz, force_n[:, None], position_m[:, None]))
 
-    Attributes
-    ----------
-    sensor : Sensor
-        The sensor.
-    frequency_hz : (n_tones,) array
-        Frequencies [Hz].
-    susceptance, loose : (n_tones,) array
-        Per length, unpressed: omega C', and the whole admittance of the film [S/m].
-    track, track_per_pascal : float
-        Resistance of both electrodes per length, and how it rises under the tip [ohm/m], [ohm/m/Pa].
 
-    Examples
-    --------
-    >>> from sensorgen.models.compression import unconfined
-    >>> sensor = Sensor(0.1, 0.01, (3e-4, 3e-4), (5.0, 5.0), 7.6e-10, unconfined(6e5))
-    >>> Forward(sensor, [1e3, 1e5]).log_impedance(np.array([3.0]), np.array([0.05])).shape
-    (1, 2)
+def bearable_n(sensor: Sensor, most_n: float = FORCE_LIMIT_N) -> float:
+    """The largest force up to ``most_n`` that a sensor bears anywhere, the tip half over its end [N].
+
+    Raises
+    ------
+    OutOfRange
+        A tip whose pressure is not uniform; a force that is not above 0.
     """
+    if sensor.profile != UNIFORM:
+        raise OutOfRange(f"a tip of profile {sensor.profile!r}: only uniform pressure can be inverted")
+    if not 0 < most_n < np.inf:
+        raise OutOfRange(f"a force limit of {most_n:g} N; expected a number above 0")
+    ends = np.array([0.0, sensor.length_m])
 
-    def __init__(self, sensor: Sensor, frequency_hz: ArrayLike) -> None:
-        if sensor.profile != UNIFORM:
-            raise OutOfRange(f"a tip of profile {sensor.profile!r}: only uniform pressure can be inverted")
-        self.sensor, self.frequency_hz = sensor, tones(frequency_hz)
-        self.susceptance: Real = 2 * np.pi * self.frequency_hz * sensor.capacitance_f_per_m
-        self.loose = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * self.susceptance
-        track, self.track_per_pascal = sensor.track_ohm_per_m()
-        self.track: Real = np.asarray(track)
-        self._load = far_load(sensor.far_end)
+    def bears(force_n: float) -> bool:
+        return refusal(OutOfRange, sensor.check_press, force_n, ends) is None
 
-    def log_impedance(self, force_n: Real, position_m: Real) -> Complex:
-        """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.impedance`.
-
-        As :meth:`Sensor.impedance`, with everything that does not depend on the press computed once.
-        """
-        sensor, force = self.sensor, force_n[:, None]
-        patch = sensor.patch(position_m[:, None])
-        stress = force / (sensor.width_m * patch.length_m)
-        thinning, _ = sensor.compression.capacitive_strain(stress)
-        pressed = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * (self.susceptance / (1 - thinning))
-        under = self.track + stress * self.track_per_pascal
-        right = np.maximum(sensor.length_m - patch.left_m - patch.length_m, 0.0)
-        z = line.through(
-            [self.track, under, self.track], [self.loose, pressed, self.loose], [patch.left_m, patch.length_m, right],
-            self._load,
-        )  # fmt: skip
-        return np.log(sensor.at_leads(z, self.frequency_hz))
-
-    def force_limit_n(self, most_n: float = FORCE_LIMIT_N) -> float:
-        """The largest force up to ``most_n`` that the sensor bears anywhere, the tip half over its end [N]."""
-        if not 0 < most_n < np.inf:
-            raise OutOfRange(f"a force limit of {most_n:g} N; expected a number above 0")
-        low, high = 0.0, most_n
-        if self._bears(high):
-            return high
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            low, high = (middle, high) if self._bears(middle) else (low, middle)
-        return low * (1 - 1e-6)
-
-    def _bears(self, force_n: float) -> bool:
-        ends = np.full(2, force_n), np.array([0.0, self.sensor.length_m])
-        return refusal(OutOfRange, self.log_impedance, *ends) is None
+    low, high = 0.0, most_n
+    if bears(high):
+        return high
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if bears(middle) else (low, middle)
+    return low * (1 - 1e-6)
 
 
 def tones(frequency_hz: ArrayLike) -> Real:
@@ -140,17 +103,19 @@ class ResponseTable:
 
     Parameters
     ----------
-    forward : Forward
+    sensor : Sensor
         The exact model.
-    force_limit_n : float
+    frequency_hz : (n_tones,) array
+        Frequencies [Hz].
+    most_n : float
         Force that the square's edge stands for [N].
     """
 
-    def __init__(self, forward: Forward, force_limit_n: float) -> None:
-        self.scale = np.array([force_limit_n, forward.sensor.length_m])
-        self.edges = _edges(forward)
+    def __init__(self, sensor: Sensor, frequency_hz: Real, most_n: float) -> None:
+        self.scale = np.array([most_n, sensor.length_m])
+        self.edges = _edges(sensor)
         force, position = (_thirds(edges) * scale for edges, scale in zip(self.edges, self.scale, strict=True))
-        values = parts(forward.log_impedance(*_pairs(force, position).T))
+        values = parts(log_impedance(sensor, frequency_hz, *_pairs(force, position).T))
         self.coefficients = _cubics(values.reshape(len(force), len(position), -1))
         self._borders = [edges[1:-1] for edges in self.edges]
         self._per_width = [1 / np.diff(edges) for edges in self.edges]
@@ -276,9 +241,9 @@ class _Filters(NamedTuple):
         return seed, shift[np.arange(len(seed)), seed].astype(float)
 
 
-def _edges(forward: Forward) -> tuple[Real, Real]:
+def _edges(sensor: Sensor) -> tuple[Real, Real]:
     """Borders of the cells in the unit square; the ends, where the tip overhangs, have cells of their own."""
-    half = min(forward.sensor.tip_m / forward.sensor.length_m / 2, 0.5)
+    half = min(sensor.tip_m / sensor.length_m / 2, 0.5)
     parts = [
         np.linspace(0, half, END_CELLS + 1),
         np.linspace(half, 1 - half, POSITION_CELLS + 1),
