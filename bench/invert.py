@@ -67,8 +67,8 @@ class Case:
         return found.force_n, found.position_m
 
     def stream(self):
-        found = [self.estimator.one(z) for z in self.z[: COUNT["stream"]]]
-        return np.array([f.force_n for f in found]), np.array([f.position_m for f in found])
+        found = [self.estimator.batch(z[None]) for z in self.z[: COUNT["stream"]]]
+        return np.concatenate([f.force_n for f in found]), np.concatenate([f.position_m for f in found])
 
     def posterior(self):
         found = self.prior.batch(self.z[: COUNT["posterior"]])

@@ -71,9 +71,10 @@ class _ByRatio:
         self._by_scatter, self._doubted = False, 0
 
     def header(self) -> str:
-        from sensorgen.prediction.calibration import answers
+        from sensorgen.prediction.calibration.answers import COLUMNS
+        from sensorgen.prediction.inverse import verdict
 
-        return answers.header([_TIME] * (_TIME in self.source.numbers) + self.source.kept)
+        return verdict.header([_TIME] * (_TIME in self.source.numbers) + self.source.kept, COLUMNS)
 
     def rows(self, block: "FileRows") -> str:
         """Rows of a block of readings; its readings at rest are the reference of those after them."""
@@ -129,9 +130,9 @@ class _Perfect:
         self.summary, self.source = answers.Summary(self.estimator, model.doubts), source
 
     def header(self) -> str:
-        from sensorgen.prediction.inverse import answers
+        from sensorgen.prediction.inverse import answers, verdict
 
-        return answers.header(self.source.kept)
+        return verdict.header(self.source.kept, answers.COLUMNS)
 
     def rows(self, block: "FileRows") -> str:
         """Rows of the readings under load of a block."""

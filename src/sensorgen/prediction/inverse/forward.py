@@ -172,7 +172,7 @@ class ResponseTable:
         force, position = (np.searchsorted(self._borders[axis], press[:, axis], side="right") for axis in (0, 1))
         return np.asarray(force * self.shape[1] + position)
 
-    def rivals(self, sigma: Real) -> tuple[Index, Real]:
+    def rivals(self, sigma: float) -> tuple[Index, Real]:
         """For every cell, the cell of the nearest other minimum of the distance, or -1; and a lower limit of it.
 
         The distance, in units of noise, is the one that is left for a press anywhere in the two cells.

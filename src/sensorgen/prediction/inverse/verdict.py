@@ -1,8 +1,9 @@
 """Statuses of estimates: one word per sample, the worst that applies, their counts, and rows of a CSV file."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from enum import IntEnum
+from statistics import median
 from typing import Any, Self
 
 import numpy as np
@@ -34,15 +35,25 @@ class Worded(IntEnum):
         return statuses
 
 
-class Counts:
-    """Counts of statuses, block by block."""
+class Tally:
+    """Counts of statuses, and medians of numbers; of the numbers, each block's median is kept.
+
+    Parameters
+    ----------
+    kind : type
+        Of the statuses.
+    """
 
     def __init__(self, kind: type[Worded]) -> None:
         self._kind, self._counts = kind, Counter[int]()
+        self._medians = defaultdict[str, list[float]](list)
 
-    def add(self, statuses: NDArray[np.uint8]) -> None:
+    def count(self, statuses: NDArray[np.uint8], **numbers: Real) -> None:
         """Count a block."""
         self._counts.update(statuses.tolist())
+        for name, values in numbers.items():
+            if len(values):
+                self._medians[name].append(float(np.median(values)))
 
     @property
     def samples(self) -> int:
@@ -56,6 +67,11 @@ class Counts:
     def most(self, *statuses: Worded) -> bool:
         """True if more than half of the samples have one of these."""
         return sum(self._counts[one] for one in statuses) > self.samples / 2
+
+    def median(self, name: str) -> float | None:
+        """Median of a number, None where there is none or it is infinite."""
+        middle = median(self._medians[name] or [np.inf])
+        return middle if middle < np.inf else None
 
 
 def header(given: Sequence[str], columns: Sequence[str]) -> str:
