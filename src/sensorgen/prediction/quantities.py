@@ -447,7 +447,7 @@ def _errors(sensor: Sensor | None, load: Load, query: Query) -> tuple[float, flo
     """Standard errors of force and position [N], [m]; NaN where the sensor is not known under pressure."""
     if sensor is None:
         return nan, nan
-    press = Setup(sensor, load.frequency_hz, query.noise, load.force_n, load.position_m, inf)
+    press = Setup(sensor, load.frequency_hz, query.noise, load.force_n, load.position_m)
     force, position, _ = press.bounds()
     return float(force), float(position)
 

@@ -33,7 +33,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.models.sensor import Response, Sensor
 from sensorgen.prediction.compression import CompressionResult
 from sensorgen.prediction.identifiability.fisher import LeastErrors, Setup, bounds, required, slopes
-from sensorgen.prediction.identifiability.identify import HIGHEST_HZ, surface
+from sensorgen.prediction.identifiability.identify import surface
 from sensorgen.prediction.query import FORCE_N, NOISE
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.sweep import Sweep
@@ -234,7 +234,7 @@ def identifiability_figure(
     title : str
         Name of the sensor.
     """
-    setup = Setup(sensor, tuple(frequency_hz), noise, force_n, sensor.length_m / 2, max(HIGHEST_HZ, *frequency_hz))
+    setup = Setup(sensor, tuple(frequency_hz), noise, force_n, sensor.length_m / 2)
     force, place = np.linspace(force_n / FORCES, force_n, FORCES), np.linspace(0.0, sensor.length_m, POSITIONS)
     limits, need = surface(setup, force, place), required(setup)
     panels = (
