@@ -478,13 +478,10 @@ def _grid(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> tuple[Real
 
 def _refined(coarse: tuple[Real, Real], fine: tuple[Real, Real], values: Real) -> Real:
     """Values on another grid, straight in between: a mean of covariances is one."""
-    shaped: Real = values.reshape(len(coarse[0]), len(coarse[1]), -1)
-    for axis in (0, 1):
-        k = np.clip(np.searchsorted(coarse[axis], fine[axis], side="right") - 1, 0, len(coarse[axis]) - 2)
-        share = (fine[axis] - coarse[axis][k]) / (coarse[axis][k + 1] - coarse[axis][k])
-        share = share.reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
-        shaped = np.take(shaped, k, axis) * (1 - share) + np.take(shaped, k + 1, axis) * share
-    return np.asarray(shaped.reshape(len(fine[0]) * len(fine[1]), *values.shape[1:]))
+    from scipy.interpolate import RegularGridInterpolator
+
+    shaped = values.reshape(len(coarse[0]), len(coarse[1]), *values.shape[1:])
+    return np.asarray(RegularGridInterpolator(coarse, shaped)(np.stack(pairs(*fine), -1)))
 
 
 def _elsewhere(model: SpecimenModel, posterior: Posterior, force_n: float) -> Real:

@@ -6,7 +6,6 @@ Least squares of presses on the unit square, many samples together; with a prior
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +15,7 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.inference import NORMAL_90, Index, LeastSquares, LocalFit, Samples, descend, parts
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Local, ResponseTable, bearable_n, log_impedance, tones
-from sensorgen.prediction.inverse.verdict import PAIR, Status, covariance, statuses
+from sensorgen.prediction.inverse.verdict import PAIR, covariance, statuses
 
 LOOSE, TIGHT = 0.2, 0.01  # share of the residual that a step still removes when a sample is done (Bates and Watts 1981)
 REACH = 0.1  # farthest that one step moves the position: beyond it the response is not linear
@@ -240,14 +239,6 @@ class Estimates(Samples):
     other_position_m: Real
 
 
-class _Pair(NamedTuple):
-    """The best presses of a block, and others that explain it as well: rows and scaled presses."""
-
-    best: LocalFit
-    rows: Index
-    others: Real
-
-
 class Estimator:
     """Weighted least squares over all frequencies, prepared for one sensor.
 
@@ -277,8 +268,8 @@ class Estimator:
     >>> sensor = Sensor(0.1, 0.01, (3e-4, 3e-4), (5.0, 5.0), 7.6e-10, unconfined(6e5))
     >>> estimator = Estimator(sensor, [1e3, 1e4, 1e5])
     >>> presses = estimator.batch(sensor.impedance(np.array([1e3, 1e4, 1e5]), 3.0, 0.06)[None])
-    >>> presses.force_n.round(6).tolist(), presses.position_m.round(6).tolist(), Status(presses.status[0]).words
-    ([3.0], [0.06], 'ok')
+    >>> presses.force_n.round(6).tolist(), presses.position_m.round(6).tolist(), presses.status.tolist()
+    ([3.0], [0.06], [0])
     """
 
     def __init__(
@@ -339,13 +330,19 @@ class Estimator:
         response = parts(np.log(np.where(measured, z, 1.0)))
         weight = np.tile(measured, 2) / self._sigma
         goal = FitGoal(response, weight, self._expected, self._information, self._table.at, LOOSE)
-        pair = self._least_squares(goal)
-        own = covariance(pair.best.information - self._information)
-        tones = measured.sum(1)
-        ambiguous = np.zeros(len(z), bool)
-        ambiguous[pair.rows] = True
-        status = statuses(pair.best, own[:, _DIAGONAL, _DIAGONAL], tones, ambiguous)
-        return self._in_si(pair, self._known(goal, pair.best), status, tones)
+        best, others = self._least_squares(goal)
+        own = covariance(best.information - self._information)
+        tones, known = measured.sum(1), self._known(goal, best)
+        status = statuses(best, own[:, _DIAGONAL, _DIAGONAL], tones, np.isfinite(others[:, 0]))
+        mean, low, high, other = (
+            np.where(tones[:, None], of, np.nan) * self.scale for of in (known.mean, known.low, known.high, others)
+        )
+        force_90, position_90 = np.stack([low, high], -1).transpose(1, 0, 2)
+        return Estimates(
+            force_n=mean[:, 0], position_m=mean[:, 1], force_90_n=force_90, position_90_m=position_90, status=status,
+            covariance=known.covariance * np.outer(self.scale, self.scale), chi2=best.chi2, tones=tones,
+            other_force_n=other[:, 0], other_position_m=other[:, 1],
+        )  # fmt: skip
 
     def _known(self, goal: FitGoal, fit: LocalFit) -> PressPosterior:
         """Means, covariances and intervals of scaled presses."""
@@ -355,22 +352,24 @@ class Estimator:
         reach = NORMAL_90 * np.sqrt(spread[:, _DIAGONAL, _DIAGONAL])
         return PressPosterior(fit.at, spread, fit.at - reach, fit.at + reach)
 
-    def _least_squares(self, goal: FitGoal) -> _Pair:
+    def _least_squares(self, goal: FitGoal) -> tuple[LocalFit, Real]:
+        """The best presses, and others that explain the readings as well, scaled (n, 2); nan where there are none."""
         table, exact = self._table, replace(goal, model=self._exact, offset=TIGHT)
         best = descend(exact, descend(goal, table.nearest(goal.response, goal.weight)).at)
-        rival = self._rival[table.cell(best.at)]
+        others, rival = np.full_like(best.at, np.nan), self._rival[table.cell(best.at)]
         rows = np.flatnonzero(rival >= 0)
-        if not rows.size:
-            return _Pair(best, rows, np.empty((0, 2)))
-        second = descend(goal.rows(rows), table.middles[rival[rows]])
-        close = np.flatnonzero(second.chi2 < best.chi2[rows] + 2 * PAIR)
-        rows = rows[close]
-        second = descend(exact.rows(rows), second.at[close])
-        won = np.flatnonzero(second.chi2 < best.chi2[rows])
-        first = best.rows(rows[won])
-        best.put(rows[won], second.rows(won))
-        second.put(won, first)
-        return _within_noise(best, rows, second)
+        if rows.size:
+            second = descend(goal.rows(rows), table.middles[rival[rows]])
+            close = np.flatnonzero(second.chi2 < best.chi2[rows] + 2 * PAIR)
+            rows = rows[close]
+            second = descend(exact.rows(rows), second.at[close])
+            won = np.flatnonzero(second.chi2 < best.chi2[rows])
+            first = best.rows(rows[won])
+            best.put(rows[won], second.rows(won))
+            second.put(won, first)
+            as_well = _within_noise(best.rows(rows), second)
+            others[rows[as_well]] = second.at[as_well]
+        return best, others
 
     def _exact(self, press: Real) -> Local:
         """The exact response; its derivatives from the table."""
@@ -378,33 +377,9 @@ class Estimator:
         exact = parts(log_impedance(self._sensor, self.frequency_hz, force, np.minimum(position, self.scale[1])))
         return Local(exact, self._table.at(press).slope)
 
-    def _in_si(
-        self, pair: _Pair, known: PressPosterior, status: NDArray[np.uint8], tones: NDArray[np.intp]
-    ) -> Estimates:
-        empty = status == Status.MISSING
-        others = np.full((len(tones), 2), np.nan)
-        others[pair.rows] = pair.others
-        mean, low, high = (
-            np.where(empty[:, None], np.nan, a) * self.scale for a in (known.mean, known.low, known.high)
-        )
-        return Estimates(
-            force_n=mean[:, 0],
-            position_m=mean[:, 1],
-            covariance=known.covariance * np.outer(self.scale, self.scale),
-            force_90_n=np.stack([low[:, 0], high[:, 0]], -1),
-            position_90_m=np.stack([low[:, 1], high[:, 1]], -1),
-            status=status,
-            chi2=pair.best.chi2,
-            tones=tones,
-            other_force_n=others[:, 0] * self.scale[0],
-            other_position_m=others[:, 1] * self.scale[1],
-        )
 
-
-def _within_noise(best: LocalFit, rows: Index, second: LocalFit) -> _Pair:
-    """Those second presses that are presses of their own and explain the reading as well."""
-    first = best.rows(rows)
+def _within_noise(first: LocalFit, second: LocalFit) -> Mask:
+    """Second presses that are presses of their own and explain the reading as well."""
     apart = second.at - first.at
     distance = np.einsum("ni,nij,nj->n", apart, first.information, apart)
-    real = (second.chi2 < first.chi2 + PAIR) & (distance > PAIR)
-    return _Pair(best, rows[real], second.at[real])
+    return np.asarray((second.chi2 < first.chi2 + PAIR) & (distance > PAIR))
