@@ -3,8 +3,6 @@
 The origin of everything in it is stated.
 """
 
-import csv
-import io
 import json
 import platform
 from collections import Counter
@@ -24,7 +22,7 @@ from sensorgen.analysis.plots.pages import Drawing, PageSection
 from sensorgen.analysis.report import alternating, electrodes, explained, history, recordings, yields
 from sensorgen.checks.review import draw
 from sensorgen.core import yamlfile
-from sensorgen.core.document import Column, Table, plain, safe, spreadsheet
+from sensorgen.core.document import Column, Table, csv_row, plain, safe, spreadsheet
 from sensorgen.core.document import markdown as document
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
@@ -325,12 +323,11 @@ def comma_separated(report: Report) -> Iterator[str]:
     yield "table,row,column,unit,value\n"
     for table in report.tables:
         for number, row in enumerate(table.cells, 1):
-            target = io.StringIO(newline="")
-            csv.writer(target, lineterminator="\n").writerows(
-                (table.key, number, column.name, column.unit, spreadsheet(cell))
+            named = (table.key, str(number))
+            yield "".join(
+                csv_row((*named, column.name, column.unit, spreadsheet(cell)))
                 for column, cell in zip(table.columns, row, strict=True)
             )
-            yield target.getvalue()
 
 
 class _Listed(list[Any]):
