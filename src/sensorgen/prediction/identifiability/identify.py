@@ -300,18 +300,15 @@ def _press(setup: Setup) -> results.ReferencePress:
     return results.ReferencePress(setup.force_n, setup.position_m, sensor.tip_m, float(stress), strain)
 
 
-def _on_a_bench(setup: Setup) -> tuple[results.StandardErrors, results.StandardErrors] | tuple[None, None]:
+def _on_a_bench(setup: Setup) -> tuple[results.StandardErrors | None, ...]:
     """Errors of a specimen, with a calibration and without."""
     from sensorgen.prediction.calibration.next_press import outlook
 
     errors = outlook(setup.sensor, np.array(setup.frequency_hz), setup.noise, setup.force_n, setup.position_m)
-    if errors is None:
-        return None, None
-    calibrated, uncalibrated = (
+    return tuple(
         results.StandardErrors(sigma_force_n=_rounded(force), sigma_position_m=_rounded(position))
         for force, position in np.array(errors).tolist()
-    )
-    return calibrated, uncalibrated
+    ) if errors else (None, None)  # fmt: skip
 
 
 def _rounded(error: float) -> float | None:
