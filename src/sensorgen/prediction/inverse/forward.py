@@ -7,7 +7,7 @@ the unit square. The table only has to lead to the solution; the exact model has
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, OutOfRange
@@ -80,13 +80,10 @@ _DEGREE = 4
 _ORDERS = np.arange(_DEGREE)
 _TO_POWERS = np.linalg.inv((np.arange(_DEGREE) / (_DEGREE - 1))[:, None] ** _ORDERS)
 
-_SLOPES = np.array([[2.0], [3.0]])  # of the square and the cube
 _FIRST_ORDER = [2, 1]  # by force, by position; the others are the value and the mixed derivative
 _TINY = np.float32(1e-30)
 _SMALL_PRODUCT = 1 << 18  # multiplications up to which BLAS keeps to one thread: more only wait for each other here
 _LOT = 32  # cells compared with all others at once: their distances stay in a core's cache
-
-Float32 = NDArray[np.float32]
 
 
 class Local(NamedTuple):
@@ -117,32 +114,26 @@ class ResponseTable:
         force, position = (_thirds(edges) * scale for edges, scale in zip(self.edges, self.scale, strict=True))
         values = parts(log_impedance(sensor, frequency_hz, *_pairs(force, position).T))
         self.coefficients = _cubics(values.reshape(len(force), len(position), -1))
-        self._borders = [edges[1:-1] for edges in self.edges]
-        self._per_width = [1 / np.diff(edges) for edges in self.edges]
         self.shape = len(self.edges[0]) - 1, len(self.edges[1]) - 1
         forces, positions = ((edges[1:] + edges[:-1]) / 2 for edges in self.edges)
         self.middles = _pairs(forces, positions)
-        seeds = _pairs(self.edges[0][1::2], positions)
-        local, reach = self.at(seeds), np.repeat(np.diff(self.edges[0][::2]), len(positions))
-        self._filters = _Filters.around(seeds, local.value, local.slope[:, 0], reach)
+        self._seeds = _pairs(self.edges[0][1::2], positions)
+        local, reach = self.at(self._seeds), np.repeat(np.diff(self.edges[0][::2]), len(positions))
+        self._origin = local.value.mean(0)
+        off, along = (local.value - self._origin).T, local.slope[:, 0].T
+        least = np.maximum(-reach, -self._seeds[:, 0])  # no force below 0, or it would explain presses elsewhere
+        filters = (2 * off, along, off * off, off * along, along * along, least, reach)
+        self._filters = [np.ascontiguousarray(of, np.float32) for of in filters]
 
     def at(self, press: Real) -> Local:
         """Interpolated response at scaled presses (n, 2)."""
-        n, axes = len(press), range(2)
-        cell = np.zeros(n, np.intp)
-        powers = np.empty((2, n, 2, _DEGREE))  # of the place within the cell, and their derivatives
-        for axis in axes:
-            k = np.searchsorted(self._borders[axis], press[:, axis], side="right")
-            cell *= self.shape[axis]
-            cell += k
-            per_width = self._per_width[axis][k]
-            t = (press[:, axis] - self.edges[axis][k]) * per_width
-            value, slope = powers[axis].transpose(1, 2, 0)
-            value[0], value[1], value[2] = 1.0, t, t * t
-            value[3] = value[2] * t
-            slope[0], slope[1] = 0.0, per_width
-            slope[2:] = value[1:3] * _SLOPES * per_width
-        rows = self.coefficients[cell]
+        n, powers, (force, position) = len(press), [], self._cells(press)
+        for edges, k, at in zip(self.edges, (force, position), press.T, strict=True):
+            width = edges[k + 1] - edges[k]
+            t, one = (at - edges[k]) / width, np.ones(n)
+            slope = np.stack([0 * one, one, 2 * t, 3 * t * t]) / width
+            powers.append(np.stack([[one, t, t * t, t * t * t], slope]).transpose(2, 0, 1))  # of the place in the cell
+        rows = self.coefficients[force * self.shape[1] + position]
         along = (powers[0] @ rows).reshape(n, 2, _DEGREE, rows.shape[2] // _DEGREE)
         both = powers[1][:, None] @ along
         return Local(both[:, 0, 0], both.reshape(n, 4, -1)[:, _FIRST_ORDER] if n else both[:, 0])
@@ -155,21 +146,29 @@ class ResponseTable:
         response, weight : (n, 2 n_tones) array
             Measured ln Z, anything finite where it is missing; 1/sigma, 0 where it is missing.
         """
-        filters = self._filters
-        size = max(1, _SMALL_PRODUCT // filters.response.size)
-        seeds = [
-            filters.nearest(response[start : start + size], weight[start : start + size])
-            for start in range(0, max(len(response), 1), size)
-        ]
-        seed, shift = (np.concatenate(column) for column in zip(*seeds, strict=True))
-        press = filters.seeds[seed]
-        least = self.edges[0][1] / 2  # at no force nothing depends on the position: a search that starts there stays
-        press[:, 0] = np.minimum(np.maximum(press[:, 0] + shift, least), 1.0)
-        return press  # type: ignore[no-any-return]
+        match, along, squares, products, curvatures, least, most = self._filters
+        square = (weight * weight).astype(np.float32)
+        wanted = square * (response - self._origin).astype(np.float32)
+        press, size = np.empty((len(response), 2)), max(1, _SMALL_PRODUCT // match.size)
+        for rows in (slice(start, start + size) for start in range(0, len(response), size)):
+            weights = square[rows][:1] if (square[rows] == square[rows][:1]).all() else square[rows]
+            slope, curvature = wanted[rows] @ along - weights @ products, weights @ curvatures + _TINY
+            shift = np.minimum(np.maximum(slope / curvature, least), most)
+            gain = wanted[rows] @ match - weights @ squares + shift * (2 * slope - curvature * shift)
+            seed = gain.argmax(1)
+            press[rows] = self._seeds[seed]
+            press[rows, 0] += shift[np.arange(len(seed)), seed]
+        lowest = self.edges[0][1] / 2  # at no force nothing depends on the position: a search that starts there stays
+        press[:, 0] = np.clip(press[:, 0], lowest, 1.0)
+        return press
+
+    def _cells(self, press: Real) -> list[Index]:
+        """Numbers of the cells that presses (n, 2) are in, along either axis."""
+        return [np.searchsorted(edges[1:-1], at, side="right") for edges, at in zip(self.edges, press.T, strict=True)]
 
     def cell(self, press: Real) -> Index:
         """Number of the cell that a press (n, 2) is in."""
-        force, position = (np.searchsorted(self._borders[axis], press[:, axis], side="right") for axis in (0, 1))
+        force, position = self._cells(press)
         return np.asarray(force * self.shape[1] + position)
 
     def rivals(self, sigma: float) -> tuple[Index, Real]:
@@ -196,49 +195,6 @@ class ResponseTable:
             spacing[lot] = np.where((rows == 0) & (columns == 1), distance, 0.0).max(axis=1)
         rival[gap == np.inf] = -1
         return rival, gap - (spacing + spacing[rival]) / 2
-
-
-class _Filters(NamedTuple):
-    """Seeds as a matched filter takes them, in single precision: (2 n_tones, k) each, and what is summed of them."""
-
-    seeds: Real
-    origin: Real
-    response: Float32
-    by_force: Float32
-    squares: Float32
-    products: Float32
-    curvatures: Float32
-    least: Float32
-    most: Float32
-
-    @classmethod
-    def around(cls, seeds: Real, response: Real, by_force: Real, reach: Real) -> "_Filters":
-        """From presses (k, 2), their responses (k, 2 n_tones), derivatives by force, and how far these reach."""
-        origin = response.mean(0)
-        off, along = (response - origin).T, by_force.T
-        least = np.maximum(-reach, -seeds[:, 0])  # no force below 0, or it would explain what presses elsewhere do
-        arrays = (2 * off, along, off * off, off * along, along * along, least, reach)
-        return cls(seeds, origin, *(np.ascontiguousarray(a, np.float32) for a in arrays))
-
-    def nearest(self, response: Real, weight: Real) -> tuple[Index, Real]:
-        """Seed and shift in force of the smallest weighted distance to each response."""
-        square = (weight * weight).astype(np.float32)
-        square = square[:1] if (square == square[:1]).all() else square
-        wanted = square * (response - self.origin).astype(np.float32)
-        along = wanted @ self.by_force
-        along -= square @ self.products
-        curvature = square @ self.curvatures
-        curvature += _TINY
-        shift = along / curvature
-        np.minimum(shift, self.most, out=shift)
-        np.maximum(shift, self.least, out=shift)
-        along *= 2
-        along -= curvature * shift
-        along *= shift
-        along += wanted @ self.response
-        along -= square @ self.squares
-        seed = along.argmax(1)
-        return seed, shift[np.arange(len(seed)), seed].astype(float)
 
 
 def _edges(sensor: Sensor) -> tuple[Real, Real]:
