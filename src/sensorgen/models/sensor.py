@@ -222,8 +222,6 @@ class Sensor:
         Parameters and errors as :meth:`impedance`; also OutOfRange where Z is infinite.
         """
         z, *slopes = line_tip.response(*self._pressed(frequency_hz, force_n, position_m))
-        if not self.lead_f and not self.lead_ohm:
-            return Response(z, *slopes)
         share = 1 / (1 + 2j * np.pi * np.asarray(frequency_hz) * self.lead_f * z)  # of the current through the sensor
         return Response(self.at_leads(z, frequency_hz), *(share**2 * slope for slope in slopes))
 

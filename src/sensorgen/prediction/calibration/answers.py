@@ -115,7 +115,7 @@ class CalibratedSummary(verdict.Tally):
     """Counts of results and medians of their widths, block by block."""
 
     def __init__(self) -> None:
-        super().__init__(Verdict)
+        super().__init__(Verdict, COLUMNS)
         self.at_rest = 0
 
     def add(self, presses: InvertedPresses, rest: Mask) -> None:

@@ -273,7 +273,6 @@ def identify(
     limits, need, reason = fisher.bounds(slopes, noise), fisher.required(setup), fisher.undefined(setup, slopes)
     helpful = most_helpful(setup, need)
     combined = together(setup, helpful) if helpful else None
-    stiff = setup.on(stiffest).bounds() if stiffest else None
     calibrated, uncalibrated = _on_a_bench(setup)
     return results.Identifiability(
         **vars(fisher.standard_errors(limits)), noise=noise, press=_press(setup),
@@ -282,15 +281,17 @@ def identify(
         senses_force=None if assumed else need.force(float(limits.force_n)),
         locates=None if assumed else need.position(float(limits.position_m)),
         verdict=fisher.verdict(setup, limits, need, reason),
-        stiffest=results.Stiffest(
-            **vars(fisher.standard_errors(stiff)), verdict=fisher.bracket(limits, stiff, need)
-        ) if stiff else None,
+        stiffest=_stiffest(setup.on(stiffest).bounds(), limits, need) if stiffest else None,
         frequencies=_frequencies(setup, slopes), map=_map(setup, need),
         best_frequencies=fisher.best(setup, slopes, need), advised_frequencies=fisher.advised(setup, need),
         changes=tuple(one.result() for one in helpful),
         changes_together=fisher.standard_errors(combined) if combined else None,
         calibrated=calibrated, uncalibrated=uncalibrated,
     )  # fmt: skip
+
+
+def _stiffest(stiff: LeastErrors, free: LeastErrors, need: Required) -> results.Stiffest:
+    return results.Stiffest(**vars(standard_errors(stiff)), verdict=fisher.bracket(free, stiff, need))
 
 
 def _press(setup: Setup) -> results.ReferencePress:

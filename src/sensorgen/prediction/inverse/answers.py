@@ -110,7 +110,7 @@ class Summary(verdict.Tally):
     """
 
     def __init__(self, estimator: Estimator, doubts: Sequence[str] = ()) -> None:
-        super().__init__(Status)
+        super().__init__(Status, COLUMNS)
         self._estimator, self._doubts = estimator, (*doubts, *estimator.doubts)
 
     def add(self, estimates: Estimates) -> None:

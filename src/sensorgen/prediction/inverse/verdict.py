@@ -42,11 +42,17 @@ class Tally:
     ----------
     kind : type
         Of the statuses.
+    columns : sequence of str
+        Of the rows.
     """
 
-    def __init__(self, kind: type[Worded]) -> None:
-        self._kind, self._counts = kind, Counter[int]()
+    def __init__(self, kind: type[Worded], columns: Sequence[str]) -> None:
+        self._kind, self._columns, self._counts = kind, columns, Counter[int]()
         self._medians = defaultdict[str, list[float]](list)
+
+    def header(self, given: Sequence[str]) -> str:
+        """Names of the columns, those of the input before; one that has the name of a result is ``..._given``."""
+        return csv_row([*(f"{name}_given" if name in self._columns else name for name in given), *self._columns])
 
     def count(self, statuses: NDArray[np.uint8], **numbers: Real) -> None:
         """Count a block."""
@@ -72,15 +78,6 @@ class Tally:
         """Median of a number, None where there is none or it is infinite."""
         middle = median(self._medians[name] or [np.inf])
         return middle if middle < np.inf else None
-
-
-def header(given: Sequence[str], columns: Sequence[str]) -> str:
-    r"""Names of the columns, those of the input before; one that has the name of a result is ``..._given``.
-
-    >>> header(["time_s", "force_n"], ["force_n", "position_mm"])
-    'time_s,force_n_given,force_n,position_mm\n'
-    """
-    return csv_row([*(f"{name}_given" if name in columns else name for name in given), *columns])
 
 
 def rows(given: Sequence[Sequence[str]], numbers: Real, tones: NDArray[np.intp], words: NDArray[Any]) -> str:
