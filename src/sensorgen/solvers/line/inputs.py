@@ -204,7 +204,7 @@ def passive(name: str, given: Any) -> NDArray[Any]:
     """A quantity of a section, complex if it is an admittance; OutOfRange where a part is below 0 or not finite."""
     value = numbers(name, given, "biufc" if name == "admittance" else "biuf")
     sides = (value.real, value.imag) if value.dtype.kind == "c" else (value,)
-    if not all(_lowest(side) >= 0 and _highest(side) < math.inf for side in sides):  # nor NaN
+    if not all(((side >= 0) & (side < math.inf)).all() for side in sides):  # nor NaN
         raise OutOfRange(f"{name} is negative or not finite; expected 0 or more")
     return value
 
@@ -222,22 +222,13 @@ def in_range(name: str, given: ArrayLike) -> Real:
     """A quantity of the line by its name in :class:`PressedLine`, or OutOfRange."""
     value: Real = numbers(name, given)[()]  # a single number as a scalar, which computes in half the time
     least = -math.inf if name in FREE else 0.0
-    low, high = _lowest(value), _highest(value)
-    if low > high or (least <= low and high < math.inf and low > -math.inf and not (low == 0 and name in ABOVE_0)):
-        return value  # there is none, or NaN, which passes through min and max, would fail each comparison
-    want = "above 0" if name in ABOVE_0 else "a number" if name in FREE else "0 or more"
     bad = np.asarray(~((value > least) & (value < math.inf)))
     if name not in FREE | ABOVE_0:
         bad &= value != 0
+    if not bad.any():
+        return value
+    want = "above 0" if name in ABOVE_0 else "a number" if name in FREE else "0 or more"
     raise OutOfRange(f"{name} has to be {want} and finite, not {np.asarray(value)[bad].flat[0]:g}")
-
-
-def _lowest(value: Real) -> float:
-    return float(value.min(initial=math.inf)) if value.ndim else float(value)
-
-
-def _highest(value: Real) -> float:
-    return float(value.max(initial=-math.inf)) if value.ndim else float(value)
 
 
 _CHECKED: dict[str, Real] = {
