@@ -6,7 +6,6 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -100,10 +99,7 @@ def grid(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position_m
     """
     f, force, at = (np.asarray(values, float) for values in (frequency_hz, force_n, position_m))
     check_presses(sensor, force, at)
-    ends = [0, *(np.flatnonzero(np.diff(sensor.whole(at))) + 1).tolist(), at.size]
-    runs = [at[start:end] for start, end in pairwise(ends)]  # tips that lie whole on the sensor all press alike
-    blocks = [sensor.impedance(f[:, None, None], force[:, None], run) for run in runs]
-    return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=-1)
+    return sensor.impedance(f[:, None, None], force[:, None], at)
 
 
 def check_presses(sensor: Sensor, force_n: ArrayLike, position_m: ArrayLike) -> None:

@@ -287,18 +287,11 @@ class Inverter:
 
     def _put(self, presses: InvertedPresses, rows: Index, readings: _Readings, tones: Mask) -> None:
         columns = np.flatnonzero(np.tile(tones, 2))
-        table = self._table(tones, columns)
-
-        def put(some: Index) -> None:
-            block = self._block(readings.rows(some), table, columns)
-            presses.put(some, replace(block, tones=np.full(len(some), tones.sum())))
-
-        blocks = [rows[start : start + _BLOCK] for start in range(0, len(rows), _BLOCK)]
-        if len(blocks) == 1:
-            put(rows)
-            return
+        table, blocks = self._table(tones, columns), np.split(rows, range(_BLOCK, len(rows), _BLOCK))
         with ThreadPoolExecutor(2) as pool:
-            list(pool.map(put, blocks))
+            of_blocks = pool.map(lambda some: self._block(readings.rows(some), table, columns), blocks)
+            for some, of_block in zip(blocks, of_blocks, strict=True):
+                presses.put(some, replace(of_block, tones=np.full(len(some), tones.sum())))
 
     def _without_one(self, presses: InvertedPresses, rows: Index, readings: _Readings, measured: Mask) -> None:
         """Of readings that no press explains, leave out the tone whose absence explains the most."""
