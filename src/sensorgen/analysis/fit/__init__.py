@@ -240,10 +240,6 @@ def _error(observable: str, residuals: Sequence[tuple[float, float]]) -> Iterato
 
 def _fingerprint(log: Log, which: _Which) -> str:
     """SHA-256 of what was fitted to."""
-    digest, mark = sha256(), ""
     readings = (f"{r.uid} {r.specimen} {r.y_ohm} {r.z_ohm} {r.quantity} {r.value}" for r in log.about(Reading, *which))
     recordings = (f"{run.uid} {run.file} {run.rig_file}" for run in log.about(BenchRun, *which))
-    for line in chain(readings, recordings):
-        digest.update(f"{mark}{line}".encode())
-        mark = "\n"
-    return digest.hexdigest()
+    return sha256("\n".join(chain(readings, recordings)).encode()).hexdigest()
