@@ -17,6 +17,7 @@ from sensorgen.analysis.comparison.expected import Movable, Predicted, at_rest
 from sensorgen.analysis.fit import estimates
 from sensorgen.analysis.fit.estimates import Error, Fit, Fitted, Untold
 from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.core.lazy import grouped
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.measure.log import BenchRun, Log, Reading
@@ -119,11 +120,9 @@ class _FitData:
 
 def _groups(allowing: Sequence[tuple[Compared, AllowedValues]]) -> dict[str, list[tuple[AllowedValues, bool]]]:
     """Readings by shape and direction, each with whether its electrode is sound."""
-    groups: dict[str, list[tuple[AllowedValues, bool]]] = {}
-    for row, reading in allowing:
-        shape = f"{row.reading.shape} {row.reading.words.axes}".strip()
-        groups.setdefault(shape, []).append((reading, usable(row)))
-    return groups
+    return grouped(
+        (f"{row.reading.shape} {row.reading.words.axes}".strip(), (reading, usable(row))) for row, reading in allowing
+    )
 
 
 def _measured(
