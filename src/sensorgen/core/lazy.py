@@ -1,4 +1,4 @@
-"""Sequences: members made when they are used, pairs grouped by key; and what the files of a folder define."""
+"""Sequences: members made when they are used, pairs by_key by key; and what the files of a folder define."""
 
 import importlib
 from array import array
@@ -15,10 +15,10 @@ Other = TypeVar("Other")
 Key = TypeVar("Key")
 
 
-def grouped(pairs: Iterable[tuple[Key, Member]]) -> dict[Key, list[Member]]:
+def by_key(pairs: Iterable[tuple[Key, Member]]) -> dict[Key, list[Member]]:
     """Second members of pairs by their first, both in the order in which they come.
 
-    >>> grouped([("a", 1), ("b", 2), ("a", 3)])
+    >>> by_key([("a", 1), ("b", 2), ("a", 3)])
     {'a': [1, 3], 'b': [2]}
     """
     groups: dict[Key, list[Member]] = {}

@@ -17,7 +17,7 @@ from sensorgen.analysis.comparison.expected import Movable, Predicted, at_rest
 from sensorgen.analysis.fit import estimates
 from sensorgen.analysis.fit.estimates import Error, Fit, Fitted, Untold
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.core.lazy import grouped
+from sensorgen.core.lazy import by_key
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.measure.log import BenchRun, Log, Reading
@@ -120,7 +120,7 @@ class _FitData:
 
 def _groups(allowing: Sequence[tuple[Compared, AllowedValues]]) -> dict[str, list[tuple[AllowedValues, bool]]]:
     """Readings by shape and direction, each with whether its electrode is sound."""
-    return grouped(
+    return by_key(
         (f"{row.reading.shape} {row.reading.words.axes}".strip(), (reading, usable(row))) for row, reading in allowing
     )
 

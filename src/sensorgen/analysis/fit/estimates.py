@@ -18,7 +18,7 @@ from sensorgen.analysis.comparison import AllowedValues
 from sensorgen.analysis.comparison.expected import PERMITTIVITY, Movable
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Facts, Part, Table
-from sensorgen.core.lazy import grouped
+from sensorgen.core.lazy import by_key
 from sensorgen.core.version import __version__
 from sensorgen.design.materials import FILM_LEAK, SourceValue, source_file
 from sensorgen.prediction.calibration.fitting import Posterior, calibrated
@@ -187,7 +187,7 @@ def text(fit: Fit) -> str:
     )
     values = ((v.material, SourceValue(v.quantity, v.value, v.low, v.high, v.note)) for v in fit.values)
     open_ = (f"not determined: {' '.join(f'{untold.parameter}: {untold.why}'.split())}" for untold in fit.untold)
-    return source_file(about, grouped(values), open_)
+    return source_file(about, by_key(values), open_)
 
 
 RESISTIVITY = "resistivity_ohm_m"

@@ -29,7 +29,7 @@ from sensorgen.checks.review import Review
 from sensorgen.core.arrays import Complex, Mask, Real, Whole
 from sensorgen.core.document import Cell, Table
 from sensorgen.core.errors import OutOfRange
-from sensorgen.core.lazy import grouped
+from sensorgen.core.lazy import by_key
 from sensorgen.core.units import M_PER_MM
 from sensorgen.models.sensor import Response, Sensor
 from sensorgen.prediction.compression import CompressionResult
@@ -127,7 +127,7 @@ def _panel(table: Table, x: int, y: int, others: Sequence[int]) -> Panel:
 
 def _grouped(table: Table, y: int, others: Sequence[int]) -> dict[str, list[tuple[Any, ...]]]:
     """Rows with a number in a column, by the other settings in words."""
-    return grouped(
+    return by_key(
         (", ".join(f"{table.columns[k].name} {row[k]}" for k in others), row)
         for row in table.cells if _is_number(row[y])
     )  # fmt: skip
