@@ -168,8 +168,6 @@ class Inverter:
         On force and position; even if not given.
     force_limit_n : float
         Largest force to look for [N].
-    level : float
-        Probability of the intervals [-].
     otherwise : float
         Probability that the press makes a share of a reading alone [-]: the sensor is softer or the tip wider than in
         the calibration, or something else is there, and the frequencies do not separate these. The share is below s
@@ -188,10 +186,9 @@ class Inverter:
 
     def __init__(
         self, model: SpecimenModel, posterior: Posterior, prior: Prior | None = None,
-        force_limit_n: float = FORCE_LIMIT_N, level: float = LEVEL, otherwise: float = 0.0,
-        session: bool = False,
+        force_limit_n: float = FORCE_LIMIT_N, otherwise: float = 0.0, session: bool = False,
     ) -> None:  # fmt: skip
-        self.level, self._otherwise, self._session = level, otherwise, session
+        self.level, self._otherwise, self._session = LEVEL, otherwise, session
         self._posterior, self._length = posterior, model.sensor.length_m
         coarse = np.linspace(0, 1, _COARSE[0]) ** 2 * force_limit_n, np.linspace(0, self._length, _COARSE[1])
         mean, covariance = readings(model, posterior, *coarse)
