@@ -193,10 +193,8 @@ def _is_told(untold: Untold, values: Iterable[tuple[str, str]]) -> bool:
 
 def with_values(body: Body, values: Sequence[Fitted]) -> Body:
     """A body with fitted values in place of those of its sources."""
-    own: dict[str, dict[str, float]] = {}
-    for value in values:
-        own.setdefault(value.material, {})[value.quantity] = value.value
-    return body.with_values(own)
+    own = by_key((value.material, (value.quantity, value.value)) for value in values)
+    return body.with_values({material: dict(of) for material, of in own.items()})
 
 
 def _reading_errors(data: _FitData, comparison: Comparison, values: Sequence[Fitted]) -> Iterator[Error]:

@@ -25,6 +25,7 @@ from sensorgen.core import yamlfile
 from sensorgen.core.document import Column, Table, csv_row, plain, safe, spreadsheet
 from sensorgen.core.document import markdown as document
 from sensorgen.core.errors import BadInput
+from sensorgen.core.lazy import by_key
 from sensorgen.core.units import M_PER_MM
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
@@ -86,14 +87,12 @@ def origins(log: Log, comparison: Comparison, *, brief: bool = False) -> Table:
 
 
 def _sources(comparison: Comparison) -> list[Origin]:
-    used: dict[str, set[str]] = {}
-    for of in comparison.predictions.values():
-        for value in of.prediction.values:
-            used.setdefault(value.source, set()).add(f"{value.material} {value.quantity} = {value.value:.6g}")
+    values = (value for of in comparison.predictions.values() for value in of.prediction.values)
+    used = by_key((value.source, f"{value.material} {value.quantity} = {value.value:.6g}") for value in values)
     known = citations() | {SET: "by the design itself"}
     return [
-        Origin("source of values", name, f"{known.get(name, name)}: {', '.join(sorted(values))}")
-        for name, values in sorted(used.items())
+        Origin("source of values", name, f"{known.get(name, name)}: {', '.join(sorted(set(of)))}")
+        for name, of in sorted(used.items())
     ]
 
 
