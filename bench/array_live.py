@@ -29,9 +29,12 @@ from sensorgen.prediction.array.readout import ArrayReadout
 
 PITCHES = {234: (10.0, 8.0, 100.0), 936: (5.0, 4.0, 20.0)}  # crossings: pitch, tracks [mm], goal [frames/s]
 TONES_HZ = {10e3: ("capacitance", "p"), 100e3: ("siemens", "n")}  # and form and prefix of the frames
+FAULTS = ("r3:8", "r2c4")  # a row broken behind a column, and a short: crossings that neighbours fill
+CASES = ((10e3, ()), (10e3, FAULTS), (100e3, ()), (100e3, FAULTS))
 MINUTES = {234: 60, 936: 60}  # of the recording whose memory is measured
 SECONDS, PERIOD_S, LOT_S = 20.0, 0.1, 1.0  # of speed, and between two lots; of memory
 REST = 100
+NOTES = "## Notes\n"
 
 
 class Lines:
@@ -68,14 +71,14 @@ def model_of(crossings):
 class Bench:
     """One array, read at its goal by a simulated clock."""
 
-    def __init__(self, crossings, hertz, folder):
+    def __init__(self, crossings, hertz, folder, faults=()):
         self.rate_hz = PITCHES[crossings][2]
         model, readout = model_of(crossings), ArrayReadout(frequency_hz=(hertz,))
-        lines = Lines(sender(model, readout, self.rate_hz), self.rate_hz, *TONES_HZ[hertz])
+        lines = Lines(sender(model, readout, self.rate_hz, faults=faults), self.rate_hz, *TONES_HZ[hertz])
         self.clock = SimulatedClock()
         meter = FrameStream(SimulatedPort(lines, self.clock, step_s=0.01), self.clock)
         meter.identify()
-        file = recorder(folder / f"{crossings}-{hertz:g}.h5", meter.shape, meter.frequency_hz)
+        file = recorder(folder / f"{crossings}-{hertz:g}-{len(faults)}.h5", meter.shape, meter.frequency_hz)
         self.feed = FrameFeed(meter, self.clock, file, unloaded_s=REST / self.rate_hz)
         self.live, self.view = LiveMaps(model, readout), MapView("bench", model)
         self.used = dict.fromkeys(("read", "invert"), 0.0)
@@ -102,9 +105,9 @@ def resident_mb():
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
-def speed(crossings, hertz, folder):
+def speed(crossings, hertz, folder, faults):
     """Words of a row: processor milliseconds of a frame, and frames a second of one core."""
-    bench = Bench(crossings, hertz, folder)
+    bench = Bench(crossings, hertz, folder, faults)
     bench.run(REST / bench.rate_hz + 2.0)  # the inverter is there
     bench.used, frames, dropped = dict.fromkeys(bench.used, 0.0), bench.feed.counts["frames"], bench.live.dropped
     bench.run(SECONDS)
@@ -114,7 +117,8 @@ def speed(crossings, hertz, folder):
     bench.close()
     by = bench.live.plan.words().partition(":")[0]
     return (
-        f"| {crossings} | {hertz / 1e3:g} kHz | {TONES_HZ[hertz][0]} | {by} | {1e3 * read:.2f} | {1e3 * invert:.2f} | "
+        f"| {crossings} | {hertz / 1e3:g} kHz | {TONES_HZ[hertz][0]} | {', '.join(faults)} | {by} | {1e3 * read:.2f} | "
+        f"{1e3 * invert:.2f} | "
         f"{1 / (read + invert):.0f} | {bench.rate_hz:g} |"
     )
 
@@ -137,13 +141,16 @@ def write(rows, memory):
         "with intervals and regions, page. Processor time of one core; the simulated device is counted as reading. "
         "Every frame is inverted, the cover undone. Capacitances alone at 100 kHz are refused: the phase is down to 29 "
         "degrees, where two capacitances give one reading.",
-        "", "| crossings | tone | frames | by | read, record [ms] | invert, show [ms] | frames/s of a core | goal |",
-        "|---|---|---|---|---|---|---|---|", *rows, "",
+        "", "| crossings | tone | frames | faults | by | read, record [ms] | invert, show [ms] | "
+        "frames/s of a core | goal |",
+        "|---|---|---|---|---|---|---|---|---|", *rows, "",
         "Memory by a simulated clock, at the goal's rate and 10 kHz, a lot each second:", "",
         "| crossings | minutes | frames recorded | lost | memory after 1 min [MB] | at the end [MB] | file [MB] |",
         "|---|---|---|---|---|---|---|", *memory, "",
     ]  # fmt: skip
-    (Path(__file__).parent / "results" / "array_live.md").write_text("\n".join(text))
+    page = Path(__file__).parent / "results" / "array_live.md"
+    notes = page.read_text().partition(NOTES)[2] if page.exists() else ""  # by hand: they stay
+    page.write_text("\n".join(text) + f"\n{NOTES}{notes}")
 
 
 def memory_row(crossings, values):
@@ -160,8 +167,8 @@ def main():
             return
         rows = []
         for crossings in PITCHES:
-            for hertz in TONES_HZ:
-                rows.append(speed(crossings, hertz, Path(name)))
+            for hertz, faults in CASES:
+                rows.append(speed(crossings, hertz, Path(name), faults))
                 print(rows[-1], flush=True)
     memory = []
     for crossings in PITCHES:

@@ -164,14 +164,14 @@ def test_an_error_of_second_order_is_stated_a_quarter_larger(monkeypatch):
 
 
 def test_a_coarser_mesh_that_is_stored_serves_as_one_that_is_solved():
-    """Stored it has every pressure of the finer mesh; solved for the comparison, one in four."""
+    """Stored it has every pressure of the finer mesh; solved for the comparison, a few."""
     loads = np.linspace(0.0, 4e4, 6).tolist()
     fine = mesh_ladder.pressed(case(), loads)
     solved = mesh_ladder._coarser(case(), fine, loads, 0, keep=False)
     mesh_ladder.pressed(case(), loads, -1)
     with cached.only_known():  # else another mesh is solved
         stored = mesh_ladder._coarser(case(), fine, loads, 0, keep=True)
-    assert stored.stress_pa.tolist() == solved.stress_pa.tolist() == [loads[k] for k in (0, 1, 5)]
+    assert stored.stress_pa.tolist() == solved.stress_pa.tolist() == [loads[k] for k in (0, 1, 2, 5)]
     assert stored.displacement_m == pytest.approx(solved.displacement_m, rel=3e-3)
     rises = [mesh_ladder._rise(solution)[0] for solution in (stored, solved)]
     assert rises[0] == pytest.approx(rises[1], rel=5e-3)

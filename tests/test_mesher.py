@@ -11,9 +11,10 @@ from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.mesh_ladder import drawn
 from sensorgen.prediction.sensor_model import piece
+from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.contact import mesher
 from sensorgen.solvers.contact.cell import cell_of, joined
-from sensorgen.solvers.contact.mesh import Fineness, mesh_of
+from sensorgen.solvers.contact.mesh import Fineness, mesh_of, pinches
 
 pytestmark = pytest.mark.skipif(find_spec("netgen") is None, reason="needs NGSolve")
 CORNERS = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
@@ -86,6 +87,25 @@ def test_straight_edges_become_one_and_nothing_moves():
         assert after.length == pytest.approx(before.length)
         assert after.hausdorff_distance(before) < 1e-9
         assert shapely.polygonize([after]).area == pytest.approx(shapely.polygonize([before]).area)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.01])
+def test_steps_that_touch_in_a_corner_are_parted(gap):
+    """The solids' area by shapely: touching steps lose 2 um over half of their height each, others nothing."""
+    boxes = {"bottom": [(0, 2, 0, 0.1)], "top": [(0, 2, 0.4, 0.5)], "": [
+        (0.5 + gap, 1.5 - gap, 0.1, 0.25), (0, 0.5, 0.25, 0.4), (1.5, 2, 0.25, 0.4)
+    ]}  # fmt: skip
+    solids = [
+        Body(end or "film", "etpu" if end else "x60", tuple(box(a, b, 0, 1, *z) for a, b, *z in spans), end)
+        for end, spans in boxes.items()
+    ]
+    cell = cell_of(Scene(tuple(solids), (2.0, 1.0, 0.5)), 2.0)
+    drawn_mm2 = sum((b - a) * (high - low) for spans in boxes.values() for a, b, low, high in spans)
+    mesh = mesh_of(cell, Fineness())
+    outline = shapely.union_all(shapely.polygons(mesh.points_m[mesh.outer[:, :3]] * 1e3))
+    lost_mm2 = (2e-3 * 0.15 / 2) * (1 if cell.mirrored else 2) * (gap == 0)
+    assert not pinches(cell)
+    assert outline.area == pytest.approx(drawn_mm2 * cell.width_mm() / 2 - lost_mm2, abs=1e-9)
 
 
 @pytest.mark.nightly

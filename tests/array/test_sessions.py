@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.stats
 from insole_sessions import Insole
 
 from in_process import run
@@ -154,7 +155,8 @@ def test_what_is_alike_in_all_elements_is_an_error_of_the_total_force(alike, sha
         return single if k == 1 else replace(bladder, reading=bladder.reading * off)
 
     known = calibrated([recorded(k) for k in range(sessions)], LawForm(powers=1))
-    assert known.common == pytest.approx(share * np.sqrt(1 + 1 / sessions), rel=0.05, abs=3e-3)
+    few = scipy.stats.t(sessions).ppf(0.95) / scipy.stats.norm.ppf(0.95)
+    assert known.common == pytest.approx(few * share * np.sqrt(1 + 1 / sessions), rel=0.05, abs=4e-3)
 
 
 def test_noise_of_readings_does_not_flatten_the_law():

@@ -43,7 +43,7 @@ __all__ = ["BoundaryConditions", "Elastic", "Fineness", "Pressed", "cell", "comp
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid when they touched counts [-]
 # Of the capacitance's mesh: growth of its triangles over that of the solids' mesh [-], and rings around corners
-_SHARP_FIELD, _BLUNT_FIELD = (0.4, 6), (0.8, 4)
+_SHARP_FIELD, _BLUNT_FIELD = (0.4, 6), (0.5, 3)
 _UM = 1e-3  # in mm
 _MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
 _APEX = (1.0, 3.0, 9.0, 20.0)  # times the size of the triangles at an apex, the next where pressure folds the finer [-]

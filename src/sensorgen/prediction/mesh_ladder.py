@@ -35,7 +35,7 @@ ROUGH = -3  # the same with triangles at an apex as large as elsewhere: small on
 _TIMES = {-3: 2.0, -2: 2.0, -1: 1.5, USUAL: 1.0, 1: 0.7, 2: 0.5}  # size of triangles by level, over the usual one [-]
 SAFETY = 2.0  # error that is expected over the measured one of another cell [-]
 _SHARP = 1.2  # the same of the default mesh in the plane, where gaps end in an apex: bench/rise_errors.py [-]
-_BLUNT = 5.0  # the same where they do not, as in prints: corners carry more [-]
+_BLUNT = 4.0  # the same where they do not, as in prints: corners carry more [-]
 _FURTHER = 2.0  # error of pressures beyond the coarser mesh's last one, over the largest below [-]
 _GRID, _ORDER = 1.25, 2  # safety factor and order of the grid convergence index (Roache 1994); 1.8 to 2.2 was seen [-]
 _AT_APEX = 8.0  # added error where triangles at an apex are as large as the displacement, over that without apex [-]
@@ -44,7 +44,7 @@ VERIFIED = 7.5e-3  # error of the rise below which nothing is stated: other prog
 _OF_DISPLACEMENT = 0.6  # error of the displacement over that of the rise, as expected [-]
 _PIECES_ORDER = 2  # power of the number of pieces with which the mesh's error falls, as another program shows it [-]
 _DOUBT = 0.5  # error of where two meshes lead, over how far that is beyond the finer one; 0.25 was seen [-]
-_APART = 4  # loads of the fine mesh to one of the coarse mesh
+_COARSE = (0.0, 0.25, 0.5, 1.0)  # pressures of a coarse mesh, besides the first one, over the last one [-]
 _ARRAYS = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
 _TUPLES = ("faults", "doubts", "carried", "apex_m")
 _MEASURED_LOADS = 11  # under which expected times were measured, besides the one of 0
@@ -172,7 +172,7 @@ def fineness(model: str, level: int) -> "Fineness | BrickCounts":
     from sensorgen.models import press2d, press_round
 
     usual = press_round.USUAL if model == "press_round" else press2d.Fineness()
-    size = replace(usual.scaled(_TIMES[level]), straight=level <= COARSEST)
+    size = usual.scaled(_TIMES[level])
     return replace(size, apex_mm=size.coarse_mm) if level == ROUGH else size
 
 
@@ -295,12 +295,18 @@ def estimated(
     return (_limit if case.model == "press3d" else _errors)(case, fine, coarse, level)
 
 
+def few(stress_pa: Sequence[float]) -> list[float]:
+    """The pressures, of some rising from 0, at which a coarse mesh serves: to compare meshes, tops or prints [Pa]."""
+    loads = np.asarray(stress_pa)
+    shares = [int(abs(loads - share * loads[-1]).argmin()) for share in _COARSE]
+    return [float(loads[k]) for k in sorted({min(1, len(loads) - 1), *shares})]
+
+
 def _coarser(case: Case, fine: "Pressed", stress_pa: Sequence[float], level: int, *, keep: bool) -> "Pressed":
     """Solution on the next coarser mesh at some pressures of a finer one; unloaded where there is no such mesh."""
-    last = len(fine.stress_pa) - 1
-    if last == 0 or _size(case.model, level - 1) == inf:
+    if len(fine.stress_pa) == 1 or _size(case.model, level - 1) == inf:
         return fine.first(1)
-    some = [float(fine.stress_pa[k]) for k in sorted({0, min(1, last), *range(last, 0, -_APART)})]
+    some = few(fine.stress_pa.tolist())
     with suppress(cached.Unknown), cached.only_known():
         if keep:  # the level before was not accurate enough: it is stored
             known = pressed(case, stress_pa, level - 1).sound()

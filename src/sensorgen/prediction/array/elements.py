@@ -182,8 +182,8 @@ class ArraySession:
     def recovery(self, tau_s: float) -> tuple[Real, Real]:
         """Reading above the tare that an earlier load left, and its error, (k, 1): as it decays, and is below after.
 
-        It decays as the law's memory does, in 100 s without one. A rest of seconds leaves that time open: half or double
-        of it is in the error.
+        It decays as the law's memory does, in 100 s without one. A rest of seconds leaves that time open: half or
+        double of it is in the error.
         """
         rate, error = self.falls
         tau_s = tau_s or _RECOVERY_S

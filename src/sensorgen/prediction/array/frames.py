@@ -22,7 +22,7 @@ from sensorgen.prediction.inference import NORMAL_90
 from sensorgen.solvers.tracks import CrossingReadings, Tracks, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
-_STEPS = 25  # of Gauss-Newton with the slopes at rest
+_STEPS, _RENEWED = 25, 5  # of Gauss-Newton, and after how many the slopes are renewed
 _DONE = 0.02  # of a standard error: a smaller step ends it
 _HEAVIER = 1.1  # times the heaviest frame so far: a later one is compared with the network too
 _SUFFICES = 0.5  # standard error by which C/C0 may differ from the network
@@ -451,10 +451,11 @@ class MapInverter:
         """Gain by the readings of all crossings that are alive."""
         return self._gain(self.alive)
 
-    def _gain(self, counted: Mask) -> tuple[Real, Real]:
+    def _gain(self, counted: Mask, at_f: "Real | None" = None) -> tuple[Real, Real]:
+        """Gain by some readings, with slopes at some capacitances, or at those predicted."""
         real, imaginary = np.isfinite(self.rest_s.real) & counted, counted
         weight = np.concatenate([part.ravel() for part in self._weights(real, imaginary)])
-        working = self.read(self.model.capacitances())
+        working = self.read(self.model.capacitances() if at_f is None else at_f)
         if self.model.here.size > MOST_DENSE:
             slopes = own_slopes(working)
             by = np.stack([slopes.real.ravel(), slopes.imag.ravel()]) * weight.reshape(2, -1)
@@ -472,11 +473,12 @@ class MapInverter:
     def capacitances(self, siemens: Complex, start: Real) -> tuple[Real, Mask]:
         """Capacitances behind one frame, with the network, and which of them settled, (m, n) [F].
 
-        Gauss-Newton with the slopes at rest; the prior, as wide as full scale, keeps what no reading tells.
+        Gauss-Newton with the slopes at rest, renewed where some steps do not end it: beside a loose track they change.
+        The prior, as wide as full scale, keeps what no reading tells.
         """
         weights, (gain, variance) = self._weights(*self.parts), self.gain
         c, spread = start, np.sqrt(variance).reshape(start.shape)
-        for _ in range(_STEPS):
+        for number in range(1, _STEPS + 1):
             left = siemens - self.read(c).siemens
             off = np.stack([np.nan_to_num(left.real) * weights[0], np.nan_to_num(left.imag) * weights[1]])
             if gain.shape[0] == 2:
@@ -484,8 +486,10 @@ class MapInverter:
             else:
                 step = gain @ off.ravel() - variance * ((c - start) / self.prior_f**2).ravel()
             before, c = c, np.maximum(c + step.reshape(c.shape), 1e-3 * start)
-            if (np.abs(c - before) < _DONE * spread).all():  # of a dead crossing the step goes on at the bound
+            if (np.abs(c - before) < _DONE * spread)[self.own].all():  # of a dead one the step goes on at the bound
                 break
+            if number % _RENEWED == 0:
+                gain, variance = self._gain(self.own, c)
         return c, np.abs(c - before) < spread
 
     @cached_property

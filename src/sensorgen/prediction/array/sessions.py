@@ -22,7 +22,7 @@ from sensorgen.prediction.inference import NORMAL_90
 LEVEL = 0.9
 TAUS_S = (10.0, 30.0, 100.0, 300.0)
 PLAYS = (0.01, 0.03, 0.1)
-_EARNED = 0.02  # share of the error by which a further term has to lower it
+_EARNED = 0.03  # share of the error by which a memory or a drift has to lower it: they are of other times than steps
 _FRAMES = 4000  # of a session, at most, by which the interval is set
 _QUIET, _PATTERN = 4.0, 4.0  # standard deviations of noise, and of tares over sessions
 _ODD = 0.02  # share of the elements that may be beyond
@@ -195,10 +195,11 @@ def _law(sums: Sequence[elements.Sums], form: elements.LawForm, scale: float) ->
 
 
 def chosen(sessions: Sequence[elements.ArraySession]) -> elements.LawForm:
-    """Form of the law that leaves the least error in sessions left out; each term of the past has to lower it by 2 %.
+    """Form of the law that leaves the least error in sessions left out.
 
-    Memory in time and play, which is alike at all speeds, are chosen together: either is taken for the other where it
-    comes first. Then the powers, then a drift of the gain, by 2 % too; of one session a cubic.
+    Memory in time, which has to lower it by 3 %, and play, which is alike at all speeds, are chosen together: either is
+    taken for the other where it comes first. Then the powers, then a drift of the gain, by 3 % too; of one session a
+    cubic.
     """
     best = elements.LawForm()
     if len(sessions) < 2:
@@ -206,8 +207,7 @@ def chosen(sessions: Sequence[elements.ArraySession]) -> elements.LawForm:
     least = float("inf")
     for change in ("past", "powers", "drift"):
         for form in _changed(best, change):
-            terms = bool(form.tau_s) + bool(form.play) + form.drift
-            cost = _left_out(sessions, form) * (1 + _EARNED) ** terms
+            cost = _left_out(sessions, form) * (1 + _EARNED * (bool(form.tau_s) + form.drift))
             if cost < least:
                 best, least = form, cost
     return best
@@ -250,6 +250,8 @@ def calibrated(sessions: Sequence[elements.ArraySession], form: "elements.LawFor
 
     The intervals' width is set by errors in each of them left out in turn; of one session by its own residuals.
     """
+    from scipy.special import stdtrit
+
     form = form or chosen(sessions)
     tares = np.stack([session.tare for session in sessions])
     quiet = np.median([np.nan_to_num(session.reading[session.unloaded]).std(0) for session in sessions], 0)
@@ -261,7 +263,8 @@ def calibrated(sessions: Sequence[elements.ArraySession], form: "elements.LawFor
     ]
     off_pairs, mean_pairs = np.sum([pairs for *_, pairs in errors], 0).tolist()
     share = off_pairs / mean_pairs if mean_pairs > 0 else 0.0
-    common = float(np.sqrt(max(share, 0.0) * (1 + 1 / len(sessions))))  # of one session more
+    few = float(stdtrit(len(sessions), (1 + LEVEL) / 2)) / NORMAL_90  # Student's t: by so many sessions
+    common = few * float(np.sqrt(max(share, 0.0) * (1 + 1 / len(sessions))))  # of one session more
     offs, means, sigmas, _ = zip(*errors, strict=True)
     off, mean, sigma = np.concatenate(offs), np.concatenate(means), np.concatenate(sigmas)
     counts = [len(each) for each in offs]

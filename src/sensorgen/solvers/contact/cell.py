@@ -1,6 +1,6 @@
 """Unit cell of a cross-section as edges with a region on each side, for a mesher; of any prismatic scene."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import dist
@@ -18,6 +18,7 @@ AIR = "air"
 BLOCK = "tip"  # material of a block on the top, which presses and carries no field
 _DIGITS = 9  # of a coordinate [mm]: places nearer than a picometre are one
 _SLIVER_MM = 1e-9
+_PARTED_MM = 2e-3  # by which steps that touch in a corner are parted: what the decimals of G-code leave open
 
 Edge = tuple[Point, Point]
 End = TypeVar("End", Point, int)  # an end of an edge, or its node's number
@@ -139,7 +140,36 @@ def between(whole: Sequence[Slice], left: float, right: float, *, mirrored: bool
             add(edges, _rounded((a, high[0])), _rounded((b, high[1])), (OUTSIDE, number[region]))
     for before, after in pairwise([None, *strips, None]):
         _uprights(edges, before, after, number)
-    return ContactCell(borders(edges), tuple(regions), left, right, mirrored)
+    return _parted(ContactCell(borders(edges), tuple(regions), left, right, mirrored))
+
+
+def _parted(cell: ContactCell) -> ContactCell:
+    """A cell in which no steps touch in a corner, which carries nothing: the lower one is set back."""
+    edges = dict(cell.edges)
+    for corner, level, upright in _touching(cell):
+        back = round(corner[0] + (_PARTED_MM if level[0] == corner else -_PARTED_MM), _DIGITS), corner[1]
+        for edge in (level, upright):
+            a, b = (back if end == corner else end for end in edge)
+            add(edges, a, b, edges.pop(edge))
+    return replace(cell, edges=edges)
+
+
+def _touching(cell: ContactCell) -> Iterator[tuple[Point, Edge, Edge]]:
+    """Corners in which two steps touch, with the level and the upright edge of the lower one."""
+    for place, faces in _by_end(cell.faces()).items():
+        upright = [edge for edge in faces if edge[0][0] == edge[1][0]]
+        level = [edge for edge in faces if edge[0][1] == edge[1][1]]
+        if len(upright) == len(level) == 2 and cell.left_mm < place[0] < cell.right_mm:
+            yield place, next(edge for edge in level if cell.solid(cell.edges[edge][1])), min(upright)
+
+
+def _by_end(edges: Iterable[Edge]) -> dict[Point, list[Edge]]:
+    """Edges by the places where they end."""
+    at: dict[Point, list[Edge]] = {}
+    for edge in edges:
+        for place in edge:
+            at.setdefault(place, []).append(edge)
+    return at
 
 
 def _layers(strip: Slice) -> list[tuple[Region, Point, Point]]:
@@ -167,10 +197,7 @@ def partition(bodies: Mapping[Region, shapely.Geometry], whole: shapely.Polygon,
 
 def joined(edges: Mapping[Edge, tuple[int, int]]) -> dict[Edge, tuple[int, int]]:
     """Edges of which those that continue each other in a straight line are one; else a mesh is fine there, too."""
-    whole, at = dict(edges), dict[Point, list[Edge]]()
-    for edge in whole:
-        for place in edge:
-            at.setdefault(place, []).append(edge)
+    whole, at = dict(edges), _by_end(edges)
     for here in at.values():
         if len(here) != 2 or whole[here[0]] != whole[here[1]] or not _in_line(*sorted(here)):
             continue

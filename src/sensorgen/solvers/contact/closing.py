@@ -216,9 +216,9 @@ def deformed(cell: ContactCell, mesh: TriangleMesh, faces: Faces, u_m: Real) -> 
     sides_of = _edges(cell, mesh)
     if u_m.any():
         sides_of = closed(sides_of, cell.air, places, faces)
-    edges = {}
+    edges, rounded = {}, [*map(tuple, np.round(places, 9).tolist())]
     for (a, b), sides in sides_of.items():
-        p, q = (tuple(np.round(places[k], 9).tolist()) for k in (a, b))
+        p, q = rounded[a], rounded[b]
         if sides[0] != sides[1] and p != q:
             edges[(p, q) if p < q else (q, p)] = sides if p < q else sides[::-1]
     return replace(cell, edges=edges, right_mm=float(np.round(places[mesh.points_m[:, 0].argmax(), 0], 9)))
@@ -244,15 +244,17 @@ def _edges(cell: ContactCell, mesh: TriangleMesh) -> Sides:
     sides_of: Sides = {}
     air, x, middles = cell.air, mesh.points_m[:, 0], mesh.rim[:, 2]
     walls = set(middles[np.isin(x[middles], (x.min(), x.max()))].tolist())  # middles of sides at the cell's ends
+    of_side, region = mesh.outer[:, 3:], mesh.region
+    count, total = np.bincount(of_side.ravel()), np.bincount(of_side.ravel(), np.repeat(region, 3))
+    differ = (count[of_side] == 1) | (total[of_side] != 2 * region[:, None])
     for k in range(3):
-        for (a, m, b), region in zip(
-            mesh.outer[:, [k, k + 3, (k + 1) % 3]].tolist(), mesh.region.tolist(), strict=True
-        ):
+        ends = mesh.outer[differ[:, k]][:, [k, k + 3, (k + 1) % 3]].tolist()
+        for (a, m, b), own in zip(ends, region[differ[:, k]].tolist(), strict=True):
             for p, q in ((a, b),) if m in walls else ((a, m), (m, b)):
-                add(sides_of, p, q, (region, OUTSIDE))
+                add(sides_of, p, q, (own, OUTSIDE))
     for p, q in mesh.outline[np.tile(~at_border(mesh), 2)].tolist():
         add(sides_of, p, q, (OUTSIDE, air))
-    nodes = {tuple(np.round(p / M_PER_MM, 9).tolist()): k for k, p in enumerate(mesh.points_m)}
+    nodes = {tuple(place): k for k, place in enumerate(np.round(mesh.points_m / M_PER_MM, 9).tolist())}
     for (a, b), sides in cell.edges.items():
         if air != OUTSIDE and set(sides) == {air, OUTSIDE}:
             add(sides_of, nodes[a], nodes[b], sides)

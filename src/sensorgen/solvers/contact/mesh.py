@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import atan2, pi
+from math import atan2, cos, dist, pi
 
 import numpy as np
 
@@ -19,6 +19,8 @@ Run = tuple[int, int]
 
 _SAME = 1e-9  # of the cell's size: places nearer than this are one
 _RINGS = 4  # around a notch
+_BLUNT_RINGS = 1  # the same where no solids meet in a point: triangles at all corners are small there
+_BLUNT_SIZE, _BLUNT_CORNER = 2 / 3, 1 / 3  # sizes of triangles there, and at corners, over those of other cells [-]
 _LEVEL = 0.1  # slope of the first chord of a dome, at most [-]
 _SIDES = ((0, 1), (1, 2), (2, 0))
 _BLOCK = 0.5  # largest triangle of a block on the top, over growth and the cell's width [-]
@@ -68,9 +70,9 @@ class Net:
 def of_triangles(points_m: Real, corners: Whole, region: Whole, *, turned: bool = False) -> TriangleMesh:
     """A mesh with middles on the sides of given triangles, which are counter-clockwise."""
     sides = np.concatenate([corners[:, side] for side in _SIDES])
-    unique, back, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    back = back.reshape(-1)
-    middles = points_m[unique].mean(axis=1)
+    low, high = np.sort(sides, axis=1).T
+    one, back, count = np.unique(low * len(points_m) + high, return_inverse=True, return_counts=True)
+    middles = points_m[np.column_stack(np.divmod(one, len(points_m)))].mean(axis=1)
     numbers = len(points_m) + back
     rim = np.column_stack([sides, numbers])[count[back] == 1]
     triangles = np.concatenate([corners, numbers.reshape(3, -1).T], axis=1)
@@ -95,15 +97,13 @@ def pinches(cell: ContactCell) -> set[Point]:
 class Fineness:
     """Sizes of triangles: where solids meet in one point, at the other ends of gaps, and far from both [mm].
 
-    ``growth`` is by how much the size grows per distance [-]. ``straight`` takes edges that continue each other as one:
-    a cell is cut wherever one of its outlines turns, and pieces of the others there make a mesh fine far from it.
+    ``growth`` is by how much the size grows per distance [-].
     """
 
     apex_mm: float = 1e-3
     corner_mm: float = 0.05
     coarse_mm: float = 0.15
     growth: float = 0.5
-    straight: bool = False
 
     def scaled(self, factor: float) -> "Fineness":
         """Every length and the growth times a factor."""
@@ -118,11 +118,14 @@ class Fineness:
 def mesh_of(cell: ContactCell, fineness: Fineness) -> TriangleMesh:
     """Mesh the solid parts of a cell.
 
-    The edges are cut here, because a mesher that smooths its sizes forgets the small ones at an apex.
+    The edges are cut here, because a mesher that smooths its sizes forgets the small ones at an apex. Where there is
+    none, edges that continue each other are one: a cell is cut wherever an outline turns, and pieces of the others
+    there would make a mesh fine far from corners.
     """
     sharp = pinches(cell)
-    if fineness.straight and not sharp:
+    if not sharp:
         cell = replace(cell, edges=joined(cell.edges))
+        fineness = replace(fineness.scaled(_BLUNT_SIZE), corner_mm=_BLUNT_CORNER * fineness.corner_mm)
     exposed = {p for edge, sides in cell.faces().items() if OUTSIDE not in sides for p in edge}
     sizes = dict.fromkeys(exposed, fineness.corner_mm) | dict.fromkeys(sharp, fineness.apex_mm)
     wide = replace(fineness, coarse_mm=max(fineness.coarse_mm, _BLOCK * fineness.growth * cell.width_mm()))
@@ -131,8 +134,8 @@ def mesh_of(cell: ContactCell, fineness: Fineness) -> TriangleMesh:
     for place in sharp:
         if _is_flat(cell, place):
             net = _parted(net, nearest(net.points_m, place))
-    tips = [nearest(net.points_m, place) for place in notches(cell)]
-    return of_triangles(*ringed(net.points_m, net.corners, net.region, tips, _RINGS), turned=cell.turned)
+    tips, count = [nearest(net.points_m, place) for place in notches(cell)], _RINGS if sharp else _BLUNT_RINGS
+    return of_triangles(*ringed(net.points_m, net.corners, net.region, tips, count), turned=cell.turned)
 
 
 def _cut(
@@ -221,15 +224,16 @@ def grown(reach: float, size: float, fineness: Fineness) -> Real:
 
 def sharp_corners(edges: Mapping[Edge, tuple[int, int]], left_mm: float, right_mm: float) -> list[Point]:
     """Where the border between two regions turns, ends or branches; the walls of the cell are mirrors."""
-    ways: dict[Point, list[Real]] = {}
+    ways: dict[Point, list[complex]] = {}
     for (p, q), sides in edges.items():
         if min(sides) > 0:
-            way = np.subtract(q, p) / np.hypot(*np.subtract(q, p))
+            way = complex(q[0] - p[0], q[1] - p[1]) / dist(p, q)
             for place, out in ((p, way), (q, -way)):
                 ways.setdefault(place, []).append(out)
-                if place[0] in (left_mm, right_mm) and out[0]:
-                    ways[place].append(out * (-1, 1))
-    return [place for place, out_of in ways.items() if len(out_of) != 2 or out_of[0] @ out_of[1] >= -np.cos(_SHARP)]
+                if place[0] in (left_mm, right_mm) and out.real:
+                    ways[place].append(-out.conjugate())
+    straight = -cos(_SHARP)
+    return [place for place, out in ways.items() if len(out) != 2 or (out[0] * out[1].conjugate()).real >= straight]
 
 
 def notches(cell: ContactCell) -> list[Point]:
