@@ -34,7 +34,7 @@ sys.path.insert(0, str(HERE.parent / "tests" / "models"))
 import line_abcd  # noqa: E402
 import line_closed  # noqa: E402
 import line_ladder  # noqa: E402
-from line_cases import PLATE, TONES, cases, exact, off, response  # noqa: E402
+from line_cases import PLATE, TONES, cases, exact, off  # noqa: E402
 
 from sensorgen.core.errors import OutOfRange  # noqa: E402
 from sensorgen.models import line  # noqa: E402
@@ -128,7 +128,8 @@ def methods() -> Iterator[tuple[str, Method, Inputs, Method | None]]:
     yield "recursion, grid", by_name(line.impedance), grid(), None
     yield "recursion, 10^5 triples", by_name(line.impedance), triples(10**5), None
     yield "recursion, 10^6 triples", by_name(line.impedance), triples(10**6), None
-    yield "recursion with dZ/dF and dZ/dx, 10^5 triples", response, triples(10**5), by_name(line.impedance)
+    slopes = by_name(line.sensitivities, of=["force_n", "left_m"])
+    yield "recursion with dZ/dF and dZ/dx, 10^5 triples", slopes, triples(10**5), by_name(line.impedance)
     yield "exponentials, corrected", by_name(line_closed.impedance), grid(), None
     yield "exponentials, B.48 as printed", by_name(line_closed.impedance, as_printed="B.48"), grid(), None
     yield "ABCD matrices", by_name(line_abcd.impedance), grid(), None

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from drawn_sensor import sensor_of
-from line_cases import response
 
 from sensorgen.core.document import text
 from sensorgen.design.design import make
@@ -81,7 +80,9 @@ def test_terms_of_the_plate_by_hand(term, ends):
         assert getattr(got, measure) == pytest.approx(expected, rel=1e-9)
 
     def slope(**end):
-        return response(**PLATE | end, frequency_hz=np.array(TONES)).by_force_ohm_per_n
+        return line.sensitivities(line.PressedLine(**PLATE | end, frequency_hz=np.array(TONES)), of=["force_n"])[1][
+            "force_n"
+        ]
 
     assert got.by_force == pytest.approx(max(abs(slope(**e) / slope() - 1).max() for e in ends), rel=1e-9)
 

@@ -5,11 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import mpmath
-import numpy as np
-
-from sensorgen.core.units import EPS0_F_PER_M
-from sensorgen.models.compression import unconfined
-from sensorgen.models.sensor import Response, Sensor
 
 FILE = json.loads((Path(__file__).parents[1] / "reference" / "line_all.json").read_text("utf-8"))
 TONES = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)
@@ -37,19 +32,6 @@ def cases() -> list[tuple[dict[str, Any], tuple[str, str]]]:
         where = {"frequency_hz": f, "force_n": force, "left_m": x}
         found.append(({**FILE["common"], **FILE["geometries"][geometry], **where}, (re, im)))
     return found
-
-
-def response(**p: Any) -> Response:
-    """Z and its derivatives by force and position; frequency, force and place may be arrays."""
-    quantities = "thickness_m", "resistivity_ohm_m", "piezoresistance_per_n"
-    ends = [[p.get(f"{end}_{of}", 0.0) for end in ("top", "bottom")] for of in quantities]
-    per_m = EPS0_F_PER_M * p["eps_r"] * p["width_m"] / p["film_m"]
-    sensor = Sensor(
-        p["length_m"], p["width_m"], tuple(ends[0]), tuple(ends[1]), per_m, unconfined(p["modulus_pa"]), p["tip_m"],
-        tan_delta=p.get("tan_delta", 0.0), leak_s_per_m=p.get("leak_s_per_m", 0.0), far_end=p.get("far_end", "open"),
-        piezoresistance_per_pa=tuple(s * p["width_m"] * p["tip_m"] for s in ends[2]),
-    )  # fmt: skip
-    return sensor.response(p["frequency_hz"], p["force_n"], np.asarray(p["left_m"]) + p["tip_m"] / 2)
 
 
 def exact(digits: int = 60, **inputs: Any) -> Any:

@@ -3,11 +3,11 @@
 import mpmath
 import numpy as np
 import pytest
-from line_cases import PLATE, TONES, cases, exact, matrix, off, response, terminated
+from line_cases import PLATE, TONES, cases, exact, matrix, off, terminated
 
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.models import line
-from sensorgen.models.line import PressedLine, cascade, corner_frequency_hz, impedance
+from sensorgen.models.line import PressedLine, cascade, corner_frequency_hz, impedance, sensitivities
 
 BIG = {"length_m": 1e3, "left_m": 450.0, "tip_m": 100.0, "force_n": 0.3}
 
@@ -112,10 +112,14 @@ def test_arrays_broadcast_and_blocks_make_no_difference(monkeypatch):
         "far_end": "open",
     }
     whole = impedance(PressedLine(**grid))
+    slopes = sensitivities(PressedLine(**grid))[1]
     assert whole.shape == (7, 11, 13)
     monkeypatch.setattr(_line_inputs, "BLOCK", 20)
     for part in (np.real, np.imag):
         np.testing.assert_allclose(part(impedance(PressedLine(**grid))), part(whole), rtol=1e-14)
+        np.testing.assert_allclose(
+            part(sensitivities(PressedLine(**grid))[1]["force_n"]), part(slopes["force_n"]), rtol=1e-12
+        )
     one = PLATE | {
         "frequency_hz": TONES[3],
         "force_n": np.linspace(-2, 6, 11)[4],
@@ -244,16 +248,23 @@ SLOPES = {
 @pytest.mark.parametrize("corner", SLOPES)
 def test_derivatives_against_mpmath(corner):
     """Central differences of the exact line with 80 digits and a step of 1e-25: right to 50 digits."""
-    inputs = PLATE | SLOPES[corner]
-    z, *by = response(**inputs)
-    assert z == pytest.approx(impedance(PressedLine(**inputs)), rel=1e-13)
+    inputs = {
+        "tan_delta": 0.0,
+        "leak_s_per_m": 0.0,
+        "top_piezoresistance_per_n": 0.0,
+        "bottom_piezoresistance_per_n": 0.0,
+    }
+    inputs |= PLATE | SLOPES[corner]
+    z, by = sensitivities(PressedLine(**inputs))
+    assert z == pytest.approx(impedance(PressedLine(**inputs)), rel=1e-14)
+    assert set(by) == set(inputs) - {"far_end"}
     with mpmath.workdps(80):
         step = mpmath.mpf(10) ** -25
-        for name, found in zip(("force_n", "left_m"), by, strict=True):
+        for name, found in by.items():
             low, high = (exact(80, **(inputs | {name: mpmath.mpf(inputs[name]) + s * step})) for s in (-1, 1))
             true = (high - low) / (2 * step)
-            if abs(true) < mpmath.mpf(10) ** -40:  # without force nothing depends on x
-                assert found == 0
+            if abs(true) < mpmath.mpf(10) ** -40:  # without force nothing depends on E, L_p or x
+                assert abs(found) < 1e-15 * abs(by["length_m"]), name
                 continue
             gap = mpmath.mpmathify(complex(found)) - true
             assert abs(gap) / abs(true) < 1e-11, name
@@ -261,44 +272,61 @@ def test_derivatives_against_mpmath(corner):
 
 
 LOSSY = {
-    "20 m": {"length_m": 20.0, "tip_m": 2.0, "force_n": 600.0},
-    "50 m": {"length_m": 50.0, "tip_m": 5.0, "force_n": 1500.0},
+    "20 m": {"length_m": 20.0, "left_m": 9.0, "tip_m": 2.0, "force_n": 600.0},
+    "50 m": {"length_m": 50.0, "left_m": 22.5, "tip_m": 5.0, "force_n": 1500.0},
+    "5 m, a small patch": {"length_m": 5.0, "force_n": 0.01},
+    "hardly pressed": {"force_n": 1e-4},
 }
 
 
 @pytest.mark.parametrize("far_end", ["open", "short", 2e3])
-@pytest.mark.parametrize("loss", [{}, {"tan_delta": 0.1}], ids=["pure", "loss"])
+@pytest.mark.parametrize("loss", [{}, {"tan_delta": 0.1, "top_piezoresistance_per_n": 0.01}], ids=["pure", "loss"])
 @pytest.mark.parametrize("case", LOSSY)
-def test_derivatives_of_a_tip_that_overhangs_keep_their_digits_on_lossy_lines(case, loss, far_end):
-    """Nearly nothing comes back from the far end: what is left of dZ/dx is a tiny number, and as right as any."""
+def test_derivatives_by_lengths_keep_their_digits_on_lossy_lines(case, loss, far_end):
+    """Nearly nothing comes back from the far end: what is left of dZ/dL is a tiny number, and as right as any."""
     inputs = PLATE | LOSSY[case] | loss | {"far_end": far_end}
-    length, tip = inputs["length_m"], inputs["tip_m"]
-    place = length - tip / 4
-    found = response(**inputs | {"left_m": place - tip / 2}).by_position_ohm_per_m
+    _, by = sensitivities(PressedLine(**inputs), of=["length_m", "tip_m"])
     with mpmath.workdps(400):
-        at, step = mpmath.mpf(place - tip / 2 + tip / 2), mpmath.mpf(10) ** -60
+        step = mpmath.mpf(10) ** -60
+        for name, found in by.items():
+            low, high = (exact(400, **(inputs | {name: mpmath.mpf(inputs[name]) + s * step})) for s in (-1, 1))
+            gap = mpmath.mpmathify(complex(found)) - (high - low) / (2 * step)
+            assert abs(gap) < 1e-11 * abs(high - low) / (2 * step), name
 
-        def z(s):
-            left = at + s * step - mpmath.mpf(tip) / 2
-            return exact(400, **inputs | {"left_m": left, "tip_m": length - left})
 
-        true = (z(1) - z(-1)) / (2 * step)
-        assert abs(mpmath.mpmathify(complex(found)) - true) < 1e-11 * abs(true)
+def test_an_unpressed_patch_may_be_of_any_length():
+    for far_end in ("open", "short", 2e3):
+        assert sensitivities(PressedLine(**PLATE | {"force_n": 0.0, "far_end": far_end}), of=["tip_m"])[1]["tip_m"] == 0
 
 
 def test_no_press_leaves_no_trace_of_position():
-    assert response(**PLATE | {"force_n": 0.0}).by_position_ohm_per_m == 0
+    assert sensitivities(PressedLine(**PLATE | {"force_n": 0.0}), of=["left_m"])[1]["left_m"] == 0
     # Film and tracks that change alike keep the characteristic impedance's ratio r/y: y is 1/(1 - s) times itself.
     strain = 3.0 / (0.01 * 0.01 * 6e6)
     alike = (1 / (1 - strain) - 1) / 3.0
     matched = PLATE | {"top_piezoresistance_per_n": alike, "bottom_piezoresistance_per_n": alike}
-    by = [abs(response(**p).by_position_ohm_per_m) for p in (matched, PLATE)]
+    by = [abs(sensitivities(PressedLine(**p), of=["left_m"])[1]["left_m"]) for p in (matched, PLATE)]
     assert by[0] < 1e-10 * by[1]
 
 
-def test_where_z_is_infinite_there_is_no_derivative():
-    with pytest.raises(OutOfRange):
-        response(**PLATE | {"frequency_hz": 0.0})
+@pytest.mark.parametrize(
+    ("change", "of", "error"),
+    [
+        ({"frequency_hz": 0.0}, None, OutOfRange),
+        ({"force_n": 0.0, "tip_m": 0.0}, ["force_n"], OutOfRange),
+        ({}, ["eps0_f_per_m"], UnknownName),
+    ],
+)
+def test_derivatives_that_do_not_exist_are_refused(change, of, error):
+    with pytest.raises(error):
+        sensitivities(PressedLine(**PLATE | change), of=of)
+
+
+def test_a_derivative_by_force_needs_a_modulus():
+    soft = {k: v for k, v in PLATE.items() if k not in ("modulus_pa", "force_n")}
+    with pytest.raises(MissingValue):
+        sensitivities(PressedLine(**soft))
+    assert set(sensitivities(PressedLine(**soft), of=["frequency_hz"])[1]) == {"frequency_hz"}
 
 
 def test_the_model_has_what_the_list_of_models_shows():

@@ -5,10 +5,10 @@ import itertools
 import mpmath
 import numpy as np
 import pytest
-from line_cases import PLATE, exact, matrix, off, response, terminated
+from line_cases import PLATE, TONES, exact, matrix, off, terminated
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.models.line import PressedLine, cascade, impedance
+from sensorgen.models.line import PressedLine, cascade, impedance, sensitivities
 from sensorgen.solvers.line.inputs import BLOCK, blocks
 
 FREQUENCIES = np.geomspace(1e-9, 1e9, 37)
@@ -99,7 +99,7 @@ def test_where_double_precision_would_lose_the_resistance_it_says_so(f):
     with pytest.raises(OutOfRange, match="too extreme"):
         impedance(PressedLine(**PLATE | {"frequency_hz": f}))
     with pytest.raises(OutOfRange, match="beyond double precision"):
-        response(**PLATE | {"frequency_hz": f})
+        sensitivities(PressedLine(**PLATE | {"frequency_hz": f}), of=["length_m"])
     low = PLATE | {"frequency_hz": 1e-140}
     assert off(impedance(PressedLine(**low)), exact(400, **low))[1] < 1e-12
 
@@ -182,15 +182,26 @@ def test_derivatives_at_the_ends_of_the_range_against_mpmath():
         {"left_m": 0.0, "force_n": -6.0},
     ):
         inputs = PLATE | change
-        _, *by = response(**inputs)
+        _, by = sensitivities(PressedLine(**inputs), of=["force_n", "left_m"])
         with mpmath.workdps(300):
             step = mpmath.mpf(10) ** -60
-            for name, found in zip(("force_n", "left_m"), by, strict=True):
+            for name, found in by.items():
                 low, high = (exact(300, **(inputs | {name: mpmath.mpf(inputs[name]) + s * step})) for s in (-1, 1))
                 true = (high - low) / (2 * step)
                 gap = mpmath.mpmathify(complex(found)) - true
                 assert abs(gap) < 1e-11 * abs(true)
                 assert abs(gap.real) < 1e-9 * abs(true.real)
+
+
+def test_some_derivatives_are_what_all_of_them_are():
+    grid = PLATE | {
+        "frequency_hz": np.array(TONES)[:, None],
+        "force_n": np.linspace(0.1, 6, 5),
+        "top_piezoresistance_per_n": 0.01,
+    }
+    everything = sensitivities(PressedLine(**grid))[1]
+    for name, value in everything.items():
+        np.testing.assert_array_equal(sensitivities(PressedLine(**grid), of=[name])[1][name], value)
 
 
 def test_a_film_that_conducts_all_over_is_a_loss_tangent():

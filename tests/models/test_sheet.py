@@ -6,7 +6,7 @@ from itertools import pairwise
 import mpmath
 import numpy as np
 import pytest
-from line_cases import PLATE, response
+from line_cases import PLATE
 
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
@@ -74,15 +74,8 @@ def test_with_edge_contacts_it_is_the_line_in_second_order(part, s_n):
 def test_derivatives_are_those_of_the_line(x):
     inputs, press = strip_press(x, 1.4, 0.0)
     tones = TONES[1:3]
-    at = inputs | {"frequency_hz": tones}
-
-    def difference(name, step):
-        ends = (line.impedance(line.PressedLine(**at | {name: at.get(name, 0.0) + s * step})) for s in (1, -1))
-        return (next(ends) - next(ends)) / (2 * step)
-
-    steps = {"top_piezoresistance_per_n": 1e-6, "bottom_piezoresistance_per_n": 1e-6, "modulus_pa": 1.0}
-    by = {name: difference(name, step) for name, step in steps.items()}
-    by["left_m"] = response(**at).by_position_ohm_per_m
+    names = ["left_m", "top_piezoresistance_per_n", "bottom_piezoresistance_per_n", "modulus_pa"]
+    _, by = line.sensitivities(line.PressedLine(**inputs | {"frequency_hz": tones}), of=names)
     got = {name: value[:, 0, 0] for name, value in solve(STRIP, [PAIR], tones, press, of=BY, cells=80).by.items()}
     force, strain = inputs["force_n"], 1 - 1 / press.capacitance_factor
     assert got["x_m"] == pytest.approx(by["left_m"], rel=1e-3)
@@ -107,7 +100,7 @@ def test_the_derivative_by_place_converges_wherever_the_patch_lies(s_n, least, w
         found = []
         for x in 0.04 + np.linspace(0, 0.005, 5):
             inputs, press = strip_press(x, 1.4, s_n)
-            true = response(**inputs | {"frequency_hz": 99.7e3}).by_position_ohm_per_m
+            true = line.sensitivities(line.PressedLine(**inputs | {"frequency_hz": 99.7e3}), of=["left_m"])[1]["left_m"]
             got = solve(STRIP, [PAIR], 99.7e3, press, of=["x_m"], cells=n).by["x_m"][0, 0, 0]
             found.append(abs(got - true) / abs(true))
         errors.append(max(found))

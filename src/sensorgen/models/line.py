@@ -4,7 +4,7 @@ A recursion from the far end to the contacts. It divides by none of resistance, 
 survives every limit. It keeps Re Z, which alone has information on position and far below the corner is 1e-3 of \|Z\|.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.solvers.line.inputs import HIGHEST_OHM, PressedLine, check_fit, far_load, in_blocks, passive, read
+from sensorgen.solvers.line.slopes import slopes
 from sensorgen.solvers.line.tanhc import tanhc
 
-__all__ = ["PressedLine", "cascade", "corner_frequency_hz", "impedance"]
+__all__ = ["PressedLine", "cascade", "corner_frequency_hz", "impedance", "sensitivities"]
 
 SOURCE = "Thesis appendix B, solved for unequal tracks, leak, loss and any far end"
 COST = 0
@@ -118,6 +119,49 @@ def cascade(
         return through(parts[:n], parts[n : 2 * n], parts[2 * n : 3 * n], None if load is None else parts[-1])
 
     return in_blocks(arrays, work)
+
+
+def sensitivities(line: PressedLine, of: Iterable[str] | None = None) -> tuple[Complex, dict[str, Complex]]:
+    r"""Impedance and its exact derivatives.
+
+    Each section's derivative by r, y and l is passed on through the recursion to the contacts. By position
+
+    .. math:: \frac{\partial Y}{\partial x} = - S\, l T\, (r_0 y_p - r_p y_0)\,
+              \frac{a + 2 Y + b Y^2}{(1 + b Y)^2}, \quad a = y_p l T, \quad b = r_p l T
+
+    with Y behind the patch and S the derivative through the section before it: nothing cancels, and without a
+    change of the characteristic impedance, sqrt(r/y), there is exactly no trace of position.
+
+    Parameters
+    ----------
+    line : PressedLine
+        As of :func:`impedance`; ``modulus_pa`` and ``tip_m`` above 0 are needed for derivatives that depend on strain.
+    of : iterable of str
+        Attributes of ``line`` to differentiate by; all real ones but ``eps0_f_per_m`` unless given.
+
+    Returns
+    -------
+    tuple of complex array, and dict of str to complex array
+        Z [ohm] and dZ/d(input) [ohm per the input's unit], in the broadcast shape.
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`impedance`; also where Z is infinite.
+    MissingValue, UnknownName, BadInput
+        As :func:`impedance`.
+
+    Examples
+    --------
+    >>> plate = dict(length_m=0.1, width_m=0.01, top_thickness_m=3e-4, bottom_thickness_m=3e-4,
+    ...              top_resistivity_ohm_m=0.07, bottom_resistivity_ohm_m=0.2, film_m=6e-4, eps_r=4.68,
+    ...              modulus_pa=6e6, tip_m=0.01)
+    >>> line = PressedLine(**plate, frequency_hz=99.7e3, force_n=6.0, left_m=0.045)
+    >>> z, by = sensitivities(line, of=["force_n", "left_m"])
+    >>> round(float(abs(by["force_n"])), 3), round(float(by["left_m"].real), 2)
+    (3.922, 90.55)
+    """
+    return slopes(line, of)
 
 
 def corner_frequency_hz(resistance_ohm: float, capacitance_f: float) -> float:

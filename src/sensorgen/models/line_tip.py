@@ -174,16 +174,7 @@ def impedance(track: RestLine, tip: LineContact, law: Compression, frequency_hz:
 def response(
     track: RestLine, tip: LineContact, law: Compression, frequency_hz: Real
 ) -> tuple[Complex, Complex, Complex]:
-    r"""Impedance [ohm] and its exact derivatives by force [ohm/N] and position [ohm/m]; otherwise as :func:`impedance`.
-
-    Each section's derivative by r, y and l is passed on through the recursion to the contacts. By the position of one
-    piece, of :math:`r_p` and :math:`y_p` on a line of :math:`r_0` and :math:`y_0`,
-
-    .. math:: \frac{\partial Y}{\partial x} = - S\, l T\, (r_0 y_p - r_p y_0)\,
-              \frac{a + 2 Y + b Y^2}{(1 + b Y)^2}, \quad a = y_p l T, \quad b = r_p l T
-
-    with Y behind the piece and S the derivative through the section before it: nothing cancels, and without a
-    change of the characteristic impedance, sqrt(r/y), there is exactly no trace of position.
+    """Impedance [ohm] and its exact derivatives by force [ohm/N] and position [ohm/m]; otherwise as :func:`impedance`.
 
     Notes
     -----

@@ -134,16 +134,23 @@ class Inputs:
 
     def track_change(self) -> Real:
         """Resistance per length that pressing adds [ohm/m], exactly 0 without force."""
+        return self["force_n"] * self.track_change_per_newton()
+
+    def track_change_per_newton(self) -> Real:
+        """Change of resistance per length and force [ohm/m/N]."""
         top, bottom = (
             self[f"{end}_resistivity_ohm_m"] * self[f"{end}_piezoresistance_per_n"] / self.section(end)
             for end in ("top", "bottom")
         )
-        return self["force_n"] * (top + bottom)
+        return top + bottom
 
     def susceptance(self) -> Real:
         """Omega C' away from the patch [S/m]."""
-        per_hertz = 2 * np.pi * self["eps0_f_per_m"] * self["eps_r"] * self["width_m"] / self["film_m"]
-        return self["frequency_hz"] * per_hertz
+        return self["frequency_hz"] * self.susceptance_per_hertz()
+
+    def susceptance_per_hertz(self) -> Real:
+        """2 pi C' away from the patch [F/m]."""
+        return 2 * np.pi * self["eps0_f_per_m"] * self["eps_r"] * self["width_m"] / self["film_m"]
 
     def sections(self) -> Sections:
         """Resistance and shunt admittance per length, and length, of the three sections."""

@@ -1,14 +1,44 @@
-"""Exact derivatives of a line by the chain rule along its sections, each computed only on demand."""
+"""Exact derivatives of the pressed line by the chain rule along its sections, each computed only on demand."""
 
-from collections.abc import Iterator, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
+from sensorgen.core.arrays import Complex
+from sensorgen.core.errors import MissingValue, OutOfRange, UnknownName
+from sensorgen.solvers.line.inputs import HIGHEST_OHM, NAMES, Inputs, PressedLine, read
 from sensorgen.solvers.line.tanhc import sech_squared, tanhc, tanhc_slope
 
 Array = Any  # of numpy, or one of its scalars
+
+BY = tuple(name for name in NAMES if name != "eps0_f_per_m")
+_OF_PATCH = {"force_n", "modulus_pa", "tip_m"}  # through the strain, which needs an area and a modulus
+
+
+def slopes(line: PressedLine, of: Iterable[str] | None) -> tuple[Complex, dict[str, Complex]]:
+    """Z [ohm] and its derivatives; see :func:`sensorgen.models.line.sensitivities`."""
+    names = tuple(BY if of is None else of)
+    for name in names:
+        if name not in BY:
+            raise UnknownName("input to differentiate by", name, BY)
+    if _OF_PATCH & set(names) and line.modulus_pa is None:
+        raise MissingValue("a derivative by force or patch needs modulus_pa")
+    found = read(line)
+    if _OF_PATCH & set(names) and not found["tip_m"].all():
+        raise OutOfRange("a derivative by force or patch needs a patch: tip_m above 0")
+    first, *rest = found.evaluate(partial(_block, names), 1 + len(names))
+    return first, dict(zip(names, rest, strict=True))
+
+
+def _block(names: tuple[str, ...], inputs: Inputs) -> list[Array]:
+    with np.errstate(all="ignore"):
+        pressed = _Pressed(inputs)
+        found = [pressed.z, *(pressed.slope(name) for name in names)]
+        if abs(pressed.z.sum()) < HIGHEST_OHM and all(np.isfinite(value.sum()) for value in found):
+            return found
+    raise OutOfRange("no derivative where Z is infinite or beyond double precision")
 
 
 class _Section:
@@ -103,3 +133,108 @@ class Chain:
     def by_shift(self, index: int, contrast: Array) -> Array:
         """Effect of a move of a section towards the far end, within a line that it differs from by r0 y - r y0."""
         return self.gain(index) * self.sections[index].by_shift * (contrast if self.opened else -contrast)
+
+
+class _Pressed(Chain):
+    """The sections left of the patch, under it and right of it, and how each input changes them."""
+
+    def __init__(self, inputs: Inputs) -> None:
+        self.inputs, self.strain = inputs, inputs.strain()
+        self.turned, self.susceptance = inputs["tan_delta"] + 1j, inputs.susceptance()
+        r, y, lengths = inputs.sections()
+        self.r, self.y = r[0], y[0]
+        super().__init__(r, y, lengths, inputs.load_ohm)
+
+    def __getitem__(self, name: str) -> Array:
+        return self.inputs[name]
+
+    def slope(self, name: str) -> Array:
+        """Derivative of Z by an input."""
+        parts = [*self._by_lengths(name)]
+        if name in _CHANGES:
+            away, pressed = _CHANGES[name](self)
+            for index, change in enumerate((away, pressed, away)):
+                parts += self.by_matter(index, *change)
+        return np.asarray(sum(parts), np.complex128)
+
+    def _by_lengths(self, name: str) -> Iterator[Array]:
+        """Effect of the sections' lengths, or of a move of the patch."""
+        if name == "left_m":
+            of_r, of_y = self._raised()
+            yield self.by_shift(1, np.asarray(self.r * of_y - of_r * self.y))  # r0 y_p - r_p y0
+        if name == "tip_m":
+            by_shunt, by_series = self.shunt_and_series(*self._raised())
+            yield self.gain(2) * (by_shunt - by_series * self.sections[1].q ** 2)
+        if name == "length_m":
+            yield self.by_length(2)
+
+    def _raised(self) -> tuple[Array, Array]:
+        """Additions of pressing to r [ohm/m] and y [S/m], exactly 0 without force."""
+        denser = self.strain / (1 - self.strain)
+        return self.inputs.track_change(), self.turned * (self.susceptance * denser)
+
+    def thinned(self, value: Array) -> Array:
+        """Under the patch, in proportion to 1/d."""
+        return value / (1 - self.strain)
+
+    def by_strain(self) -> Array:
+        """Derivative of the admittance under the patch by strain [S/m]."""
+        return self.turned * (self.susceptance / (1 - self.strain) ** 2)
+
+
+_Change = tuple[Array, Array]  # derivative of resistance [ohm/m] and admittance [S/m] per length by an input
+_Changes = tuple[_Change, _Change]  # away from the patch, and under it
+
+
+def _of_film(of_susceptance: Callable[[_Pressed], Array], p: _Pressed) -> _Changes:
+    """By an input that enters the susceptance only."""
+    change = of_susceptance(p)
+    return (0.0, p.turned * change), (0.0, p.turned * p.thinned(change))
+
+
+def _by_width(p: _Pressed) -> _Changes:
+    away, pressed = p.inputs.tracks()
+    wider = p.susceptance / p["width_m"]
+    film = p.turned * p.thinned(wider) - p.by_strain() * (p.strain / p["width_m"])
+    return (-away / p["width_m"], p.turned * wider), (-pressed / p["width_m"], film)
+
+
+def _by_stiffness(name: str, p: _Pressed) -> _Changes:
+    """By modulus or length of the patch: both lower the strain."""
+    return (0.0, 0.0), (0.0, -p.by_strain() * (p.strain / p[name]))
+
+
+def _by_force(p: _Pressed) -> _Changes:
+    touches_at = p["width_m"] * p["tip_m"] * p["modulus_pa"]
+    return (0.0, 0.0), (p.inputs.track_change_per_newton(), p.by_strain() / touches_at)
+
+
+def _by_resistivity(end: str, p: _Pressed) -> _Changes:
+    section = p.inputs.section(end)
+    return (1 / section, 0.0), ((1 + p[f"{end}_piezoresistance_per_n"] * p["force_n"]) / section, 0.0)
+
+
+def _by_thickness(end: str, p: _Pressed) -> _Changes:
+    away, pressed = _by_resistivity(end, p)
+    thinner = -p[f"{end}_resistivity_ohm_m"] / p[f"{end}_thickness_m"]
+    return (thinner * away[0], 0.0), (thinner * pressed[0], 0.0)
+
+
+def _by_piezoresistance(end: str, p: _Pressed) -> _Changes:
+    return (0.0, 0.0), (p[f"{end}_resistivity_ohm_m"] * p["force_n"] / p.inputs.section(end), 0.0)
+
+
+_CHANGES: dict[str, Callable[[_Pressed], _Changes]] = {
+    "width_m": _by_width,
+    "film_m": partial(_of_film, lambda p: -p.susceptance / p["film_m"]),
+    "eps_r": partial(_of_film, lambda p: p.susceptance / p["eps_r"]),
+    "frequency_hz": partial(_of_film, lambda p: p.inputs.susceptance_per_hertz()),
+    "tan_delta": lambda p: ((0.0, p.susceptance), (0.0, p.thinned(p.susceptance))),
+    "leak_s_per_m": lambda _: ((0.0, 1.0), (0.0, 1.0)),
+    "modulus_pa": partial(_by_stiffness, "modulus_pa"),
+    "tip_m": partial(_by_stiffness, "tip_m"),
+    "force_n": _by_force,
+    **{f"{end}_resistivity_ohm_m": partial(_by_resistivity, end) for end in ("top", "bottom")},
+    **{f"{end}_thickness_m": partial(_by_thickness, end) for end in ("top", "bottom")},
+    **{f"{end}_piezoresistance_per_n": partial(_by_piezoresistance, end) for end in ("top", "bottom")},
+}
