@@ -67,7 +67,7 @@ def impedance(line: PressedLine) -> Complex:
     >>> round(float(z.real), 6), round(float(z.imag), 3)
     (2999.654163, -2094651.586)
     """
-    return cascade(*read(line).sections(), line.far_end)
+    return read(line).evaluate(lambda block: [through(*block.sections(), block.load_ohm)])[0]
 
 
 def cascade(
@@ -115,10 +115,10 @@ def cascade(
     check_fit("the sections' values", arrays)
     n = len(r)
 
-    def work(parts: list[NDArray[Any]]) -> Complex:
-        return through(parts[:n], parts[n : 2 * n], parts[2 * n : 3 * n], None if load is None else parts[-1])
+    def work(parts: list[NDArray[Any]]) -> list[Complex]:
+        return [through(parts[:n], parts[n : 2 * n], parts[2 * n : 3 * n], None if load is None else parts[-1])]
 
-    return in_blocks(arrays, work)
+    return in_blocks(arrays, work)[0]
 
 
 def sensitivities(line: PressedLine, of: Iterable[str] | None = None) -> tuple[Complex, dict[str, Complex]]:

@@ -114,6 +114,19 @@ class Inputs:
     def __getitem__(self, name: str) -> Real:
         return self.values[name]
 
+    def arrays(self) -> list[Real]:
+        """All quantities, the load last if there is one."""
+        return [*self.values.values(), *([] if self.load_ohm is None else [self.load_ohm])]
+
+    def evaluate(self, work: Callable[["Inputs"], list[Complex]], count: int = 1) -> list[Complex]:
+        """Broadcast results of ``work``, ``count`` of them; see :func:`in_blocks`."""
+
+        def part(arrays: list[Real]) -> list[Complex]:
+            load = None if self.load_ohm is None else arrays[-1]
+            return work(Inputs(dict(zip(self.values, arrays, strict=False)), load))
+
+        return in_blocks(self.arrays(), part, count)
+
     def strain(self) -> Real:
         """Strain of the film under the patch, F / (W L_p E) [-]; 0 without force."""
         force, touches_at = self["force_n"], self["width_m"] * self["tip_m"] * self["modulus_pa"]
@@ -187,7 +200,7 @@ def read(line: PressedLine) -> Inputs:
         values["modulus_pa"] = np.float64(1.0)  # type: ignore[assignment]
     inputs = Inputs(values, far_load(line.far_end))
     try:
-        np.broadcast_shapes(*{v.shape for v in (*values.values(), np.asarray(inputs.load_ohm))})
+        np.broadcast_shapes(*{v.shape for v in inputs.arrays()})
     except ValueError:
         shapes = ", ".join(f"{k} {v.shape}" for k, v in values.items() if v.ndim)
         raise BadInput(f"the line's inputs do not broadcast together: {shapes}") from None
@@ -211,7 +224,7 @@ def passive(name: str, given: Any) -> NDArray[Any]:
     """A quantity of a section, complex if it is an admittance; OutOfRange where a part is below 0 or not finite."""
     value = numbers(name, given, "biufc" if name == "admittance" else "biuf")
     sides = (value.real, value.imag) if value.dtype.kind == "c" else (value,)
-    if not all(((side >= 0) & (side < math.inf)).all() for side in sides):  # nor NaN
+    if not all(_lowest(side) >= 0 and _highest(side) < math.inf for side in sides):  # nor NaN
         raise OutOfRange(f"{name} is negative or not finite; expected 0 or more")
     return value
 
@@ -229,13 +242,22 @@ def in_range(name: str, given: ArrayLike) -> Real:
     """A quantity of the line by its name in :class:`PressedLine`, or OutOfRange."""
     value: Real = numbers(name, given)[()]  # a single number as a scalar, which computes in half the time
     least = -math.inf if name in FREE else 0.0
+    low, high = _lowest(value), _highest(value)
+    if low > high or (least <= low and high < math.inf and low > -math.inf and not (low == 0 and name in ABOVE_0)):
+        return value  # there is none, or NaN, which passes through min and max, would fail each comparison
+    want = "above 0" if name in ABOVE_0 else "a number" if name in FREE else "0 or more"
     bad = np.asarray(~((value > least) & (value < math.inf)))
     if name not in FREE | ABOVE_0:
         bad &= value != 0
-    if not bad.any():
-        return value
-    want = "above 0" if name in ABOVE_0 else "a number" if name in FREE else "0 or more"
     raise OutOfRange(f"{name} has to be {want} and finite, not {np.asarray(value)[bad].flat[0]:g}")
+
+
+def _lowest(value: Real) -> float:
+    return float(value.min(initial=math.inf)) if value.ndim else float(value)
+
+
+def _highest(value: Real) -> float:
+    return float(value.max(initial=-math.inf)) if value.ndim else float(value)
 
 
 _CHECKED: dict[str, Real] = {
@@ -254,33 +276,54 @@ def far_load(far_end: ArrayLike) -> Real | None:
 
 
 def _check(inputs: Inputs) -> None:
-    """Refuse a patch beyond the sensor, electrodes that touch, a force without an area, and a negative resistivity."""
-    end, length, strain = inputs["left_m"] + inputs["tip_m"], inputs["length_m"], inputs.strain()
-    bad = np.asarray(end > length * (1 + ROUNDING))
-    if bad.any():
-        far, size = (float(np.broadcast_to(v, bad.shape)[bad].flat[0]) for v in (end, length))
-        raise OutOfRange(f"the pressed patch ends at {far:g} m, beyond the sensor's {size:g} m")
-    if np.isinf(strain).any():
-        raise OutOfRange("a force presses on a patch without area: tip_m has to be above 0 where force_n is not 0")
-    if (strain >= 1).any():
-        raise OutOfRange(f"the force strains the film by {strain.max():.3g}: at 1 its electrodes touch (Eq. B.49)")
+    """Refuse a patch beyond the sensor, electrodes that touch, and a negative resistivity.
+
+    Extremes of each quantity decide for a million samples, where they can.
+    """
+    _check_patch(inputs)
+    _check_strain(inputs)
     for name in ("top_piezoresistance_per_n", "bottom_piezoresistance_per_n"):
         if inputs[name].any() and (rise := inputs[name] * inputs["force_n"]).min(initial=0.0) < -1:
             raise OutOfRange(f"{name} times force_n is {rise.min():.3g}: below -1 resistivity is negative")
 
 
-def in_blocks(arrays: Sequence[NDArray[Any]], work: Callable[[list[NDArray[Any]]], Complex]) -> Complex:
-    """Broadcast result, evaluated block by block so that temporaries stay small."""
+def _check_patch(inputs: Inputs) -> None:
+    """Refuse a patch beyond the sensor."""
+    left, patch, length = (inputs[name] for name in ("left_m", "tip_m", "length_m"))
+    if _highest(left) + _highest(patch) > _lowest(length):
+        end = left + patch
+        bad = np.asarray(end > length * (1 + ROUNDING))
+        if bad.any():
+            far, size = (float(np.broadcast_to(v, bad.shape)[bad].flat[0]) for v in (end, length))
+            raise OutOfRange(f"the pressed patch ends at {far:g} m, beyond the sensor's {size:g} m")
+
+
+def _check_strain(inputs: Inputs) -> None:
+    """Refuse electrodes that touch, and a force without an area."""
+    touches_at = _lowest(inputs["width_m"]) * _lowest(inputs["tip_m"]) * _lowest(inputs["modulus_pa"])
+    if not (touches_at > 0 and _highest(inputs["force_n"]) < touches_at * (1 - ROUNDING)):
+        strain = inputs.strain()
+        if np.isinf(strain).any():
+            raise OutOfRange("a force presses on a patch without area: tip_m has to be above 0 where force_n is not 0")
+        if (strain >= 1).any():
+            raise OutOfRange(f"the force strains the film by {strain.max():.3g}: at 1 its electrodes touch (Eq. B.49)")
+
+
+def in_blocks(
+    arrays: Sequence[NDArray[Any]], work: Callable[[list[NDArray[Any]]], list[Complex]], count: int = 1
+) -> list[Complex]:
+    """Broadcast results, ``count`` of them, evaluated block by block so that temporaries stay small."""
     shapes = [v.shape for v in arrays if v.ndim]
     shape = np.broadcast_shapes(*set(shapes))
     first, *more = blocks(tuple(slice(0, n) for n in shape), shapes)
     if not more:
-        whole = work(list(arrays))
-        return np.array(np.broadcast_to(whole, shape))[()] if np.shape(whole) != shape else whole[()]
-    result = np.empty(shape, np.complex128)
+        results_of = work(list(arrays))
+        return [np.array(np.broadcast_to(v, shape))[()] if np.shape(v) != shape else v[()] for v in results_of]
+    results = [np.empty(shape, np.complex128) for _ in range(count)]
     for slices in (first, *more):
-        result[slices] = work([_cut(v, slices) for v in arrays])
-    return result
+        for result, value in zip(results, work([_cut(v, slices) for v in arrays]), strict=True):
+            result[slices] = value
+    return results
 
 
 def blocks(slices: Slices, shapes: Sequence[tuple[int, ...]]) -> Iterator[Slices]:
