@@ -67,8 +67,8 @@ class Case:
         return found.force_n, found.position_m
 
     def stream(self):
-        found = [self.estimator.one(z) for z in self.z[: COUNT["stream"]]]
-        return np.array([f.force_n for f in found]), np.array([f.position_m for f in found])
+        found = [self.estimator.batch(z[None]) for z in self.z[: COUNT["stream"]]]
+        return np.concatenate([f.force_n for f in found]), np.concatenate([f.position_m for f in found])
 
     def posterior(self):
         found = self.prior.batch(self.z[: COUNT["posterior"]])
@@ -96,7 +96,7 @@ class Case:
         return roots.force_n, roots.choice(self.sensor.length_m)
 
     def forward(self):
-        self.estimator._forward.log_impedance(self.force, self.position)
+        self.sensor.impedance(self.tones, self.force[:, None], self.position[:, None])
         return self.force, self.position
 
     def bound(self):

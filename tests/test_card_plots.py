@@ -34,7 +34,7 @@ def test_it_has_maps_of_both_errors_and_single_tones(tmp_path):
 
 def test_the_maps_are_in_newtons_and_millimetres():
     meshes = [axes.collections[0].get_array() for axes in drawn_of(PLATE, TONES_HZ).axes[:2]]
-    here = Setup(PLATE, TONES_HZ, 1e-3, 6.0, 0.05, 1e6).bounds()
+    here = Setup(PLATE, TONES_HZ, 1e-3, 6.0, 0.05).bounds()
     for mesh, expected in zip(meshes, (float(here.force_n), 1e3 * float(here.position_m)), strict=True):
         middle = np.asarray(mesh).reshape(plots.FORCES, plots.POSITIONS)[-1, plots.POSITIONS // 2]
         assert middle == pytest.approx(expected, rel=1e-9)
@@ -45,7 +45,7 @@ def test_marks_of_the_tones_are_what_each_tells_alone():
     for axes, pick, scale in ((force, "force_n", 1.0), (position, "position_m", 1e3)):
         marks = next(line for line in axes.lines if line.get_marker() == "o")
         assert np.asarray(marks.get_xdata()) == pytest.approx(np.array(TONES_HZ) / 1e3)
-        last = getattr(Setup(PLATE, TONES_HZ[-1:], 1e-3, 6.0, 0.05, 1e6).bounds(), pick)
+        last = getattr(Setup(PLATE, TONES_HZ[-1:], 1e-3, 6.0, 0.05).bounds(), pick)
         assert marks.get_ydata()[-1] == pytest.approx(scale * float(last))
 
 

@@ -17,7 +17,6 @@ from sensorgen.design.values import lead_ranges, material_value, spread
 from sensorgen.models.overlap import edge_fringe_f
 from sensorgen.prediction import bodies, compression_law
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.inverse.forward import Forward
 from sensorgen.prediction.quantities import MULTIMETER, WEIGHT, WIDE
 from sensorgen.prediction.results import _change
 
@@ -133,9 +132,6 @@ def test_leads_are_a_two_port_in_front_of_the_line():
         )
     by_force = (led.impedance(tones, force + 1e-4, place) - led.impedance(tones, force - 1e-4, place)) / 2e-4
     assert led.response(tones, force, place).by_force_ohm_per_n == pytest.approx(by_force, rel=1e-6)
-    forward = Forward(led, tones)
-    at = np.log(led.impedance(tones, force, place))
-    assert forward.log_impedance(np.array([force]), np.array([place]))[0] == pytest.approx(at, rel=1e-12)
 
 
 def test_leads_that_are_stated_are_known_to_a_tenth():

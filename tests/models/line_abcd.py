@@ -51,10 +51,10 @@ def impedance(line: PressedLine) -> Complex:
     >>> round(float(z.real), 3)
     2997.117
     """
-    return read(line).evaluate(_block)[0]
+    return _block(read(line))
 
 
-def _block(inputs: Inputs) -> list[Complex]:
+def _block(inputs: Inputs) -> Complex:
     r, y, lengths = inputs.sections()
     with np.errstate(all="ignore"):
         left, patch, right = (_matrix(*part) for part in zip(r, y, lengths, strict=True))
@@ -63,7 +63,7 @@ def _block(inputs: Inputs) -> list[Complex]:
         z = np.asarray(a / c if load is None else (a * load + b) / (c * load + d), np.complex128)
     if not np.isfinite(z).all():
         raise OutOfRange("transfer matrices have no number here (cosh overflows, or r or y is 0): take model 'line'")
-    return [z]
+    return z
 
 
 def _matrix(r: NDArray[Any], y: NDArray[Any], length: NDArray[Any]) -> Matrix:

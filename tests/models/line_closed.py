@@ -3,7 +3,6 @@
 Right where Re(gamma l) is under 355, tracks resist and the frequency is not low; see docs/line.md.
 """
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -64,7 +63,7 @@ def impedance(line: PressedLine, as_printed: str = "") -> Complex:
     """
     if as_printed and as_printed not in PRINTED:
         raise UnknownName("misprint", as_printed, PRINTED)
-    return _open(line).evaluate(partial(_product, as_printed))[0]
+    return _product(as_printed, _open(line))
 
 
 def uniform(line: PressedLine) -> Complex:
@@ -87,7 +86,7 @@ def uniform(line: PressedLine) -> Complex:
     OutOfRange
         As :func:`impedance`.
     """
-    return _open(line).evaluate(_uniform)[0]
+    return _uniform(_open(line))
 
 
 def series(line: PressedLine) -> Complex:
@@ -108,7 +107,7 @@ def series(line: PressedLine) -> Complex:
     OutOfRange
         A far end that is not open; no current at all.
     """
-    return _open(line).evaluate(_series)[0]
+    return _series(_open(line))
 
 
 def _open(line: PressedLine) -> Inputs:
@@ -118,7 +117,7 @@ def _open(line: PressedLine) -> Inputs:
     return found
 
 
-def _product(printed: str, inputs: Inputs) -> list[Complex]:
+def _product(printed: str, inputs: Inputs) -> Complex:
     r, y, lengths = inputs.sections()
     height, width = inputs["top_thickness_m"], inputs["width_m"]
     with np.errstate(all="ignore"):
@@ -129,7 +128,7 @@ def _product(printed: str, inputs: Inputs) -> list[Complex]:
         (a, b, c, d), second, third = parts
         for e, f, g, h in (second, third):
             a, b, c, d = e * a + f * c, e * b + f * d, g * a + h * c, g * b + h * d
-        return [_finite(-d / c)]
+        return _finite(-d / c)
 
 
 def _matrix(printed: str, rho: Array, gamma: Array, height: Array, width: Array, length: Array) -> Matrix:
@@ -142,19 +141,19 @@ def _matrix(printed: str, rho: Array, gamma: Array, height: Array, width: Array,
     return same, a12, -a21 if printed == "B.39" else a21, same
 
 
-def _uniform(inputs: Inputs) -> list[Complex]:
+def _uniform(inputs: Inputs) -> Complex:
     r, y, _ = inputs.sections()
     area = inputs["top_thickness_m"] * inputs["width_m"]
     with np.errstate(all="ignore"):
         rho, gamma = r[0] * area / 2, r[0] * y[0] / 2
         e = np.exp(2 * np.sqrt(2 * gamma) * inputs["length_m"])
-        return [_finite(np.sqrt(2.0) * rho * (1 + e) / (area * np.sqrt(gamma) * (-1 + e)))]
+        return _finite(np.sqrt(2.0) * rho * (1 + e) / (area * np.sqrt(gamma) * (-1 + e)))
 
 
-def _series(inputs: Inputs) -> list[Complex]:
+def _series(inputs: Inputs) -> Complex:
     r, y, _ = inputs.sections()
     with np.errstate(all="ignore"):
-        return [_finite(r[0] * inputs["length_m"] + 1 / (y[0] * inputs["length_m"]))]
+        return _finite(r[0] * inputs["length_m"] + 1 / (y[0] * inputs["length_m"]))
 
 
 def _finite(z: Array) -> Complex:

@@ -3,7 +3,6 @@
 For comparison with `line` and as the circuit behind the ngspice tests; see docs/line.md.
 """
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -58,10 +57,10 @@ def impedance(line: PressedLine, cells: int = 100, *, one_sided: bool = False) -
     found = read(line)
     if found.load_ohm is not None:
         raise OutOfRange("the ladder's far end is open; for others take model 'line'")
-    return found.evaluate(partial(_block, cells, one_sided))[0]
+    return _block(cells, one_sided, found)
 
 
-def _block(cells: int, one_sided: bool, inputs: Inputs) -> list[Complex]:
+def _block(cells: int, one_sided: bool, inputs: Inputs) -> Complex:
     behind, before = (1.0, 0.0) if one_sided else (0.5, 0.5)
     admittance: Any = np.asarray(0j)
     with np.errstate(all="ignore"):
@@ -73,4 +72,4 @@ def _block(cells: int, one_sided: bool, inputs: Inputs) -> list[Complex]:
         z = np.asarray(1 / admittance)
     if not np.isfinite(z).all():
         raise OutOfRange("no current flows through the ladder: its impedance is infinite")
-    return [z]
+    return z

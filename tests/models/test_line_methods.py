@@ -61,7 +61,7 @@ def test_the_misprints_and_their_effect():
     free = GRID | {"force_n": 0.0}
     z = line.impedance(line.PressedLine(**free))
     assert line_closed.impedance(line.PressedLine(**free)) == pytest.approx(z, rel=1e-12)
-    assert line_closed.uniform(line.PressedLine(**free)) == pytest.approx(z, rel=1e-12)
+    assert np.broadcast_to(line_closed.uniform(line.PressedLine(**free)), z.shape) == pytest.approx(z, rel=1e-12)
     one = PLATE | {"force_n": 0.0, "tip_m": 0.0, "left_m": 0.0}
     z = line.impedance(line.PressedLine(**one))
     assert line_closed.impedance(line.PressedLine(**one), "B.48") == pytest.approx(z / np.sqrt(0.135), rel=1e-12)

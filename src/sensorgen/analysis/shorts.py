@@ -9,7 +9,6 @@ that r counts their holes, too. Both are updated by the log's prints of the same
 D.1. Holes are taken to conduct independently of each other. Without prints the result is the prior.
 """
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -23,6 +22,7 @@ from sensorgen.asprinted.pinholes import CoveredFilm, Pinholes, draws, films, op
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput
+from sensorgen.core.lazy import by_key
 from sensorgen.design.design import Design
 from sensorgen.design.printer import load_quality
 from sensorgen.design.specimen_name import QUALITIES
@@ -88,14 +88,12 @@ class FilmRisk(Pinholes):
             "each conducts with one unknown probability, independently; anything else as in series 23, by shape and "
             "layers, which fail together or one by one"
         )
-        by_layers, every = Counter[int](), Counter[int]()
-        for (_, layers), (yes, total) in series().items():
-            by_layers[layers] += yes
-            every[layers] += total
-        shares = ", ".join(f"{by_layers[n]} of {every[n]} with {n}" for n in sorted(every))
+        by_layers = by_key((layers, counts) for (_, layers), counts in series().items())
+        sums = ((layers, *map(sum, zip(*counts, strict=True))) for layers, counts in sorted(by_layers.items()))
+        shares = ", ".join(f"{low} of {total} with {layers}" for layers, low, total in sums)
         known = (
             f"low film resistance, at most {ORDER:g} times the electrode's, by layers of the film: {shares}. More "
-            f"layers are not shown to help; no print had more than {max(every)}"
+            f"layers are not shown to help; no print had more than {max(by_layers)}"
         )
         yield Facts((
             ("P(short)", f"{_words(self.posterior)}; {counted}"), ("before", _words(self.prior)),
@@ -166,13 +164,11 @@ def series() -> Counts:
     >>> sum(total for _, total in series().values())
     51
     """
-    shorted, every = Counter[tuple[str, int]](), Counter[tuple[str, int]]()
-    for r in thesis_readings():
-        if r.iteration == SERIES and r.film_mm is not None and r.y_ohm and r.z_ohm:
-            key = r.shape, round(r.film_mm / load_quality(QUALITIES[r.slicing] or "fine").layer_mm)
-            shorted[key] += _low(r)
-            every[key] += 1
-    return {key: (shorted[key], total) for key, total in every.items()}
+    alike = by_key(
+        ((r.shape, round(r.film_mm / load_quality(QUALITIES[r.slicing] or "fine").layer_mm)), _low(r))
+        for r in thesis_readings() if r.iteration == SERIES and r.film_mm is not None and r.y_ohm and r.z_ohm
+    )  # fmt: skip
+    return {key: (sum(low), len(low)) for key, low in alike.items()}
 
 
 def elsewhere(shape: str, layers: Sequence[int], counts: Counts | None = None) -> Real:

@@ -71,9 +71,7 @@ class _ByRatio:
         self._by_scatter, self._doubted = False, 0
 
     def header(self) -> str:
-        from sensorgen.prediction.calibration import answers
-
-        return answers.header([_TIME] * (_TIME in self.source.numbers) + self.source.kept)
+        return self.summary.header([_TIME] * (_TIME in self.source.numbers) + self.source.kept)
 
     def rows(self, block: "FileRows") -> str:
         """Rows of a block of readings; its readings at rest are the reference of those after them."""
@@ -129,9 +127,7 @@ class _Perfect:
         self.summary, self.source = answers.Summary(self.estimator, model.doubts), source
 
     def header(self) -> str:
-        from sensorgen.prediction.inverse import answers
-
-        return answers.header(self.source.kept)
+        return self.summary.header(self.source.kept)
 
     def rows(self, block: "FileRows") -> str:
         """Rows of the readings under load of a block."""

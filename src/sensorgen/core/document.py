@@ -3,8 +3,6 @@
 A result that a command prints or a notebook displays has a method ``document()`` that yields these parts.
 """
 
-import csv
-import io
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -386,11 +384,8 @@ def csv_row(cells: Iterable[str]) -> str:
 
 def comma_separated(table: Table) -> str:
     """A table as CSV with all digits and all columns."""
-    target = io.StringIO(newline="")
-    writer = csv.writer(target, lineterminator="\n")
-    writer.writerow([c.key or c.head for c in table.columns])
-    writer.writerows([spreadsheet(cell) for cell in row] for row in table.cells)
-    return target.getvalue()
+    rows = (map(spreadsheet, row) for row in table.cells)
+    return "".join(map(csv_row, ((c.key or c.head for c in table.columns), *rows)))
 
 
 def spreadsheet(cell: Cell) -> str:

@@ -7,6 +7,7 @@ from itertools import groupby
 from typing import Literal, TypeVar
 
 from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.lazy import by_key
 
 SEVERITIES = ("error", "warning", "info")
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
@@ -192,10 +193,8 @@ def runs(items: Iterable[Item], number: Callable[[Item], int]) -> Iterator[list[
 
 
 def _by_sentence(findings: Sequence[Finding]) -> Iterable[list[Finding]]:
-    merged: dict[tuple[str, str, str, str], list[Finding]] = {}
-    for f in sorted(findings, key=lambda f: (bool(f.waiver), SEVERITIES.index(f.severity))):
-        merged.setdefault((f.severity, f.waiver, f.rule, _NUMBER.sub("0", f.message)), []).append(f)
-    return merged.values()
+    ranked = sorted(findings, key=lambda f: (bool(f.waiver), SEVERITIES.index(f.severity)))
+    return by_key(((f.severity, f.waiver, f.rule, _NUMBER.sub("0", f.message)), f) for f in ranked).values()
 
 
 def _joined(alike: Sequence[Finding]) -> Finding:

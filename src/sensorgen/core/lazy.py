@@ -1,4 +1,4 @@
-"""Things made when they are used: members of a long sequence, and what the files of a folder define."""
+"""Sequences: members made when they are used, pairs by_key by key; and what the files of a folder define."""
 
 import importlib
 from array import array
@@ -12,6 +12,19 @@ from sensorgen.core.errors import UnknownName
 
 Member = TypeVar("Member")
 Other = TypeVar("Other")
+Key = TypeVar("Key")
+
+
+def by_key(pairs: Iterable[tuple[Key, Member]]) -> dict[Key, list[Member]]:
+    """Second members of pairs by their first, both in the order in which they come.
+
+    >>> by_key([("a", 1), ("b", 2), ("a", 3)])
+    {'a': [1, 3], 'b': [2]}
+    """
+    groups: dict[Key, list[Member]] = {}
+    for key, member in pairs:
+        groups.setdefault(key, []).append(member)
+    return groups
 
 
 class Lazy(Sequence[Member], Generic[Member]):

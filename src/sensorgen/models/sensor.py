@@ -159,6 +159,12 @@ class Sensor:
                     "kPa): press less, or set a piezoresistance nearer to 0"
                 )
 
+    def check_press(self, force_n: ArrayLike, position_m: ArrayLike) -> None:
+        """Refuse presses under which electrodes touch, or beyond the law of compression; as :meth:`check_tracks`."""
+        stress = self.stress_pa(force_n, position_m)
+        self.compression.capacitive_strain(stress)
+        self.check_tracks(stress)
+
     def contact_m(self, force_n: ArrayLike) -> tuple[Real, Real]:
         """Length of the contact where it lies on the sensor whole [m], and its derivative by the force [m/N]."""
         if self.contact is None:
@@ -216,8 +222,6 @@ class Sensor:
         Parameters and errors as :meth:`impedance`; also OutOfRange where Z is infinite.
         """
         z, *slopes = line_tip.response(*self._pressed(frequency_hz, force_n, position_m))
-        if not self.lead_f and not self.lead_ohm:
-            return Response(z, *slopes)
         share = 1 / (1 + 2j * np.pi * np.asarray(frequency_hz) * self.lead_f * z)  # of the current through the sensor
         return Response(self.at_leads(z, frequency_hz), *(share**2 * slope for slope in slopes))
 

@@ -20,6 +20,7 @@ from sensorgen.core import cache as cached
 from sensorgen.core import yamlfile
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
+from sensorgen.core.lazy import by_key
 from sensorgen.design.body import Cells
 from sensorgen.models import capacitance_models
 from sensorgen.prediction.plan import PlanCandidate
@@ -356,10 +357,7 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
 
 def _together(refused: Sequence[str]) -> str:
     """Refusals of models, each reason once."""
-    names: dict[str, list[str]] = {}
-    for line in refused:
-        name, _, reason = line.partition(": ")
-        names.setdefault(reason, []).append(name)
+    names = by_key((reason, name) for name, _, reason in (line.partition(": ") for line in refused))
     return "; ".join(f"{', '.join(those)}: {reason}" for reason, those in names.items())
 
 

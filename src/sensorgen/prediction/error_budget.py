@@ -84,12 +84,9 @@ def error_budget(
         *(_exposed(model, reference) if pressed else ()),
     )  # fmt: skip
     terms = (*map(reference.term, assumptions), *(_read_off(model, reference) if pressed else ()))
-    total = Changes()
-    for term in terms:
-        total = total + (term.changes or Changes())
-    known = all(t.changes for t in terms)
-    at_least = any(t.at_least for t in terms)
-    return ErrorBudget(load.force_n, load.position_m, terms, total if known else None, at_least, accuracy)
+    known = [term.changes for term in terms if term.changes]
+    total = sum(known, Changes()) if len(known) == len(terms) else None
+    return ErrorBudget(load.force_n, load.position_m, terms, total, any(t.at_least for t in terms), accuracy)
 
 
 def _with_capacitances(model: SensorModel, values_f: Sequence[float]) -> list[Sensor]:

@@ -223,9 +223,7 @@ class LeastSquares(ABC):
 
     def _reachable(self, step: Real) -> Real:
         """Step shortened to the reach."""
-        if np.isinf(self.reach):
-            return step
-        return np.asarray(step * self.reach / np.maximum(self.reach, np.abs(step).max(1, keepdims=True)))
+        return np.asarray(step / np.maximum(1.0, np.abs(step).max(1, keepdims=True) / self.reach))
 
     def done(self, fit: LocalFit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
         """Samples of which this is the last step, by it and by its gain in the sum of squares."""

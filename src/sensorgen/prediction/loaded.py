@@ -6,7 +6,6 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.core.units import M_PER_MM, frequency_text, si
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
+from sensorgen.models import refusal
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
@@ -50,51 +50,24 @@ class ImpedanceGrid:
     position_mm: tuple[float, ...]
     impedance_ohm: Complex
 
-    def changes(self, noise: float) -> list[dict[str, float | None]]:
-        """Range of R and X of each frequency over force and over position, in standard deviations of a reading.
+    def changes(self, noise: float) -> Iterator[tuple[float | None, ...]]:
+        """Ranges of R and X of each frequency over force and over position, in standard deviations of a reading.
 
         Parameters
         ----------
         noise : float
             Standard deviation of Re Z and of Im Z of one reading, relative to abs(Z) [-].
 
-        Returns
-        -------
-        list of dict
-            Per frequency: over force at the middle position, over position at the largest force [-]; None along an
-            axis of one value.
+        Yields
+        ------
+        tuple
+            Of R over force at the middle position, of R over position at the largest force, and both of X [-]; None
+            along an axis of one value.
         """
-        changes = []
         for z in self.impedance_ohm:
             deviation, middle = noise * np.abs(z).max(), z.shape[1] // 2
-            changes.append(
-                {
-                    f"{name}_by_{axis}": float(np.ptp(part) / deviation) if len(part) > 1 else None
-                    for name, values in (("re", z.real), ("im", z.imag))
-                    for axis, part in (("force", values[:, middle]), ("position", values[-1]))
-                }
-            )
-        return changes
-
-
-def impedance_grid(
-    sensor: Sensor, frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float]
-) -> ImpedanceGrid:
-    """Impedance for every frequency [Hz], force [N] and position [mm], each rising.
-
-    Raises
-    ------
-    OutOfRange
-        As :func:`grid`; also more than ``LARGEST`` impedances.
-    """
-    counts = [len(axis) for axis in (frequency_hz, force_n, position_mm)]
-    if math.prod(counts) > LARGEST:
-        raise OutOfRange(
-            f"{' x '.join(map(str, counts))} frequencies, forces and positions; expected at most {LARGEST} impedances "
-            "at once: use larger steps, or CSV"
-        )
-    z = grid(sensor, frequency_hz, force_n, np.asarray(position_mm) * M_PER_MM)
-    return ImpedanceGrid(tuple(frequency_hz), tuple(force_n), tuple(position_mm), z)
+            parts = (part for values in (z.real, z.imag) for part in (values[:, middle], values[-1]))
+            yield tuple(float(np.ptp(part) / deviation) if len(part) > 1 else None for part in parts)
 
 
 def grid(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Complex:
@@ -126,10 +99,7 @@ def grid(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position_m
     """
     f, force, at = (np.asarray(values, float) for values in (frequency_hz, force_n, position_m))
     check_presses(sensor, force, at)
-    ends = [0, *(np.flatnonzero(np.diff(sensor.whole(at))) + 1).tolist(), at.size]
-    runs = [at[start:end] for start, end in pairwise(ends)]  # tips that lie whole on the sensor all press alike
-    blocks = [sensor.impedance(f[:, None, None], force[:, None], run) for run in runs]
-    return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=-1)
+    return sensor.impedance(f[:, None, None], force[:, None], at)
 
 
 def check_presses(sensor: Sensor, force_n: ArrayLike, position_m: ArrayLike) -> None:
@@ -160,13 +130,7 @@ def check_presses(sensor: Sensor, force_n: ArrayLike, position_m: ArrayLike) -> 
 
 def _refusal(sensor: Sensor, force_n: float, position_m: float) -> str:
     """Why a press has no answer, "" if it has one."""
-    try:
-        stress = sensor.stress_pa(force_n, position_m)
-        sensor.compression.capacitive_strain(stress)
-        sensor.check_tracks(stress)
-    except OutOfRange as error:
-        return str(error).partition(": press less")[0]
-    return ""
+    return (refusal(OutOfRange, sensor.check_press, force_n, position_m) or "").partition(": press less")[0]
 
 
 def positions_mm(design: Design) -> tuple[float, ...]:
@@ -320,7 +284,15 @@ class Loaded(Displayed):
     @cached_property
     def impedance(self) -> ImpedanceGrid:
         """Over frequency, force and position [ohm]; raises OutOfRange where there are too many to keep."""
-        return impedance_grid(self.model.sensor, *self.axes)
+        frequency_hz, force_n, position_mm = map(tuple, self.axes)
+        counts = [len(axis) for axis in self.axes]
+        if math.prod(counts) > LARGEST:
+            raise OutOfRange(
+                f"{' x '.join(map(str, counts))} frequencies, forces and positions; expected at most {LARGEST} "
+                "impedances at once: use larger steps, or CSV"
+            )
+        z = grid(self.model.sensor, frequency_hz, force_n, np.asarray(position_mm) * M_PER_MM)
+        return ImpedanceGrid(frequency_hz, force_n, position_mm, z)
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -369,7 +341,7 @@ class Loaded(Displayed):
         names = ("R by force", "R by position", "X by force", "X by position")
         changes = zip(frequency_hz, self.impedance.changes(self.noise), strict=True)
         columns = (_FREQUENCY, *(Column(name, digits=3) for name in names))
-        return Table("changes", caption, columns, tuple((f, *change.values()) for f, change in changes))
+        return Table("changes", caption, columns, tuple((f, *change) for f, change in changes))
 
     def _corners(self) -> Table:
         """R and X at the last frequency, at the ends and in the middle of both axes."""

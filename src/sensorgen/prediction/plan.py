@@ -75,6 +75,11 @@ class Level:
     candidates: tuple[PlanCandidate, ...]
     chosen: str = ""
 
+    @property
+    def choice(self) -> PlanCandidate:
+        """The candidate of that name."""
+        return next(c for c in self.candidates if c.model == self.chosen)
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -108,10 +113,8 @@ class Plan:
 
     def shares(self) -> Iterator[str]:
         """Error that the chosen model of each level reached, in words."""
-        for level in self.levels:
-            yield from (
-                f"{level.name} {_error(c.width)} ({c.model})" for c in level.candidates if c.model == level.chosen
-            )
+        chosen = ((level.name, level.choice) for level in self.levels if level.chosen)
+        yield from (f"{name} {_error(of.width)} ({of.model})" for name, of in chosen)
 
 
 def candidates_table(candidates: Sequence[PlanCandidate], caption: str = "", chosen: str = "") -> Table:

@@ -148,23 +148,16 @@ def _gap(body: Body) -> Bounds | None:
 
 def _at_rest(result: Prediction, body: Body, rest: resting.RestState, frequency_hz: tuple[float, ...]) -> Prediction:
     """Capacitance, resistance, corner frequency and impedance without a load."""
-    r_only, c_only, gone, (farad, ohm) = (
-        rest.resistance,
-        rest.capacitance,
-        resting.lost(body.design),
-        resting.added(body),
-    )
-    resistance, c = {end: r.plus(*ohm) for end, r in r_only.items()}, c_only.plus(*farad)
+    gone, (farad, ohm), c = resting.lost(body.design), resting.added(body), rest.capacitance
+    resistance = {end: r.plus(*ohm) for end, r in rest.resistance.items()}
     if set(resistance) != set(ENDS):
-        return replace(result, capacitance=c, resistance=resistance)
-    r = _of_line(r_only["top"], r_only["bottom"], add, "ohm")
-    corner = _of_line(r, c_only, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
+        return replace(result, capacitance=c.plus(*farad), resistance=resistance)
+    r = _of_line(rest.resistance["top"], rest.resistance["bottom"], add, "ohm")
+    dispersion = body.design.effects.permittivity_dispersion
     return replace(
-        result, capacitance=c, resistance=resistance, corner_frequency=corner,
-        impedance=tuple(
-            _impedance(f, r, c_only, gone, (farad, ohm), body.design.effects.permittivity_dispersion)
-            for f in frequency_hz
-        ),
+        result, capacitance=c.plus(*farad), resistance=resistance,
+        corner_frequency=_of_line(r, c, line.corner_frequency_hz, "Hz"),
+        impedance=tuple(_impedance(f, r, c, gone, (farad, ohm), dispersion) for f in frequency_hz),
     )  # fmt: skip
 
 
@@ -447,7 +440,7 @@ def _errors(sensor: Sensor | None, load: Load, query: Query) -> tuple[float, flo
     """Standard errors of force and position [N], [m]; NaN where the sensor is not known under pressure."""
     if sensor is None:
         return nan, nan
-    press = Setup(sensor, load.frequency_hz, query.noise, load.force_n, load.position_m, inf)
+    press = Setup(sensor, load.frequency_hz, query.noise, load.force_n, load.position_m)
     force, position, _ = press.bounds()
     return float(force), float(position)
 

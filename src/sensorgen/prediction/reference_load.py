@@ -14,6 +14,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.identifiability.fisher import bounds, relative
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE, GUESS
+from sensorgen.prediction.inference import parts
 from sensorgen.prediction.query import NOISE, Load
 from sensorgen.prediction.rest_state import LOWEST_HZ
 from sensorgen.prediction.results import Changes, Term
@@ -35,7 +36,7 @@ class LoadedImpedance(NamedTuple):
 
     def shift(self) -> Real:
         """Logarithm of pressed over rest, by which a press is detected: its real parts before its imaginary ones."""
-        return _parts(np.log(self.pressed / self.rest))
+        return parts(np.log(self.pressed / self.rest))
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ class ReferenceLoad:
             return LoadedImpedance(*(*self._response(sensor), sensor.impedance(self._frequency, 0.0, self.at[1])))
         tones = [(sensor.at(f), np.array([f])) for f in self._frequency.tolist()]
         read = [(*s.response(f, *self.at), s.impedance(f, 0.0, self.at[1])) for s, f in tones]
-        return LoadedImpedance(*(np.concatenate(parts) for parts in zip(*read, strict=True)))
+        return LoadedImpedance(*map(np.concatenate, zip(*read, strict=True)))
 
     def stress_pa(self) -> float:
         """Highest pressure under the tip [Pa]."""
@@ -125,11 +126,11 @@ class ReferenceLoad:
                 read = self._read(other)
             except OutOfRange:
                 return None
-            parts = [_difference(part(read.pressed), part(self._own.pressed)) for part in (np.abs, np.real, np.imag)]
+            z = [_difference(part(read.pressed), part(self._own.pressed)) for part in (np.abs, np.real, np.imag)]
             c = abs(other.capacitance_f_per_m / self.sensor.capacitance_f_per_m - 1)
             press = self._misread(read._replace(rest=self._own.rest) if since_rest else read)
             slope = _difference(read.by_force, self._own.by_force)
-            found = found.max(Changes(*(factor * d for d in (*parts, slope, c, *press))))
+            found = found.max(Changes(*(factor * d for d in (*z, slope, c, *press))))
         return found
 
     def other_circuit(self) -> Changes:
@@ -157,7 +158,7 @@ class ReferenceLoad:
         own, at, scale = self._own, np.array(self.at), np.array([self.force_n, self.sensor.length_m])
         sought = read.shift()
         for _ in range(_STEPS):
-            by = np.column_stack([_parts(own.by_force / own.pressed), _parts(own.by_position / own.pressed)])
+            by = np.column_stack([parts(own.by_force / own.pressed), parts(own.by_position / own.pressed)])
             step = np.linalg.lstsq(by * scale, sought - own.shift(), rcond=_PARALLEL)[0]
             after = np.clip(at + step * scale, 0.0, [_MOST * self.force_n, self.sensor.length_m])
             if np.abs(step).max() < _SETTLED:
@@ -187,10 +188,6 @@ class ReferenceLoad:
         ends = [wrong, *map(self._grades, others)]
         words = zip((CANNOT_SENSE, CANNOT_LOCATE), self._told, zip(*ends, strict=True), strict=True)
         return ", ".join(cannot for cannot, own, of in words if own < 1 <= max(of))
-
-
-def _parts(values: Complex) -> Real:
-    return np.concatenate([values.real, values.imag])
 
 
 def _difference(one: NDArray[Any], other: NDArray[Any]) -> float:

@@ -11,6 +11,7 @@ from sensorgen.core.display import Boundless, Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
+from sensorgen.core.lazy import by_key
 from sensorgen.core.records import adapter
 from sensorgen.core.units import si
 from sensorgen.design.values import ASSUMED, ENDS, MaterialValue
@@ -157,10 +158,7 @@ class ErrorBudget:
         by_press = self.by_press()
         if by_press[0].wrong():
             yield f"largest assumption: {by_press[0].words()}"
-        turned: dict[str, list[str]] = {}
-        for term in by_press:
-            for words in filter(None, term.turns.split(", ")):
-                turned.setdefault(words, []).append(term.name)
+        turned = by_key((words, t.name) for t in by_press for words in filter(None, t.turns.split(", ")))
         turned.pop("CHANGE" if verdict == "CHANGE" else "PRINT" if verdict else "", None)
         if turned:
             shown = (f"{words} ({name}{f', {len(more)} more' * bool(more)})" for words, (name, *more) in turned.items())

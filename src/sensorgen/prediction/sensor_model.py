@@ -249,7 +249,7 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
     until_pa = pressure_pa(body, tip, load.force_n)
     sensor = rough.sensor
     line = _expected(_line(sensor, load, wanted / 3))
-    share = (wanted - min(_reach(line), wanted / 3)) / 2
+    share = (wanted - min(line.choice.reach(), wanted / 3)) / 2
     changes = ReferenceLoad(sensor, load).change(_scaled(sensor, 1 + _NUDGE))
     by_capacitance = changes.magnitude / _NUDGE if changes else 1.0
     printed = None if body.is_drawn else piece(body)
@@ -298,17 +298,17 @@ def execute(planned: PredictionPlan) -> tuple[SensorModel, Plan]:
         sensor, load, *(_scaled(sensor, end / rest.capacitance.value) for end in (bounds.lower, bounds.upper))
     )
     law, compression = run_until_within(
-        replace(compression, allowed=_left(accuracy - spent - _reach(line), compression)),
+        replace(compression, allowed=_left(accuracy - spent - line.choice.reach(), compression)),
         {option.name: option.find for option in planned.options(rest.answer)},
         lambda law: _error_of_law(sensor, load, replace(law, others=law.of_mesh or law.others)),
     )
-    spent += max(_width(compression), _error_of_law(sensor, load, law) if law.of_mesh else 0.0)
+    spent += max((compression.choice.width or 0.0), _error_of_law(sensor, load, law) if law.of_mesh else 0.0)
     model = build_sensor(planned.body, _with_failures(law, compression), planned.tip, rest=rest)
     line = _line(model.sensor, load, _left(accuracy - spent, line), line)
     if model.sensor.profile != UNIFORM:
         model = replace(model, sensor=replace(model.sensor, pieces=_NAMES[line.chosen]))
     levels = (_results(cell, rest.answer), compression, line)
-    return model, replace(planned.plan, levels=levels, width=spent + _width(line))
+    return model, replace(planned.plan, levels=levels, width=spent + (line.choice.width or 0.0))
 
 
 def _left(accuracy: float, level: Level) -> float:
@@ -386,13 +386,3 @@ def _line(sensor: Sensor, load: Load, allowed: float, expected: Level | None = N
 def _expected(level: Level) -> Level:
     """Results for a rough sensor, as what to expect."""
     return replace(level, candidates=tuple(PlanCandidate(c.model, c.width, c.seconds) for c in level.candidates))
-
-
-def _reach(level: Level) -> float:
-    """Expected error of the chosen candidate [-]."""
-    return next(c.reach() for c in level.candidates if c.model == level.chosen)
-
-
-def _width(level: Level) -> float:
-    """Error that the chosen candidate reached [-]."""
-    return next(c.width or 0.0 for c in level.candidates if c.model == level.chosen)

@@ -224,16 +224,14 @@ def gradient(unknowns: Sequence[Parameter], at: Real, steps: Real, target: Coupo
 
 
 def _quantiles(means: Real, sigmas: Real, weights: Real, *, linear: bool) -> Interval95:
+    from scipy.optimize import brentq
     from scipy.special import ndtr
 
     ends = []
     for level in (0.5, 0.025, 0.975):
-        low, high = (means - 9 * sigmas).min(), (means + 9 * sigmas).max()
-        for _ in range(60):
-            middle = (low + high) / 2
-            below = weights @ ndtr((middle - means) / sigmas) < level
-            low, high = (middle, high) if below else (low, middle)
-        value = float(high if linear else np.exp(high))
+        around = (means - 9 * sigmas).min(), (means + 9 * sigmas).max()
+        at = brentq(lambda end, level=level: weights @ ndtr((end - means) / sigmas) - level, *around, xtol=1e-15)
+        value = float(at if linear else np.exp(at))
         ends.append(0.0 if linear and abs(value) < 1e-9 * float(sigmas.max()) else value)
     return Interval95(*ends)
 

@@ -17,6 +17,7 @@ from sensorgen.analysis.comparison.expected import Movable, Predicted, at_rest
 from sensorgen.analysis.fit import estimates
 from sensorgen.analysis.fit.estimates import Error, Fit, Fitted, Untold
 from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.core.lazy import by_key
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.measure.log import BenchRun, Log, Reading
@@ -119,11 +120,9 @@ class _FitData:
 
 def _groups(allowing: Sequence[tuple[Compared, AllowedValues]]) -> dict[str, list[tuple[AllowedValues, bool]]]:
     """Readings by shape and direction, each with whether its electrode is sound."""
-    groups: dict[str, list[tuple[AllowedValues, bool]]] = {}
-    for row, reading in allowing:
-        shape = f"{row.reading.shape} {row.reading.words.axes}".strip()
-        groups.setdefault(shape, []).append((reading, usable(row)))
-    return groups
+    return by_key(
+        (f"{row.reading.shape} {row.reading.words.axes}".strip(), (reading, usable(row))) for row, reading in allowing
+    )
 
 
 def _measured(
@@ -194,10 +193,8 @@ def _is_told(untold: Untold, values: Iterable[tuple[str, str]]) -> bool:
 
 def with_values(body: Body, values: Sequence[Fitted]) -> Body:
     """A body with fitted values in place of those of its sources."""
-    own: dict[str, dict[str, float]] = {}
-    for value in values:
-        own.setdefault(value.material, {})[value.quantity] = value.value
-    return body.with_values(own)
+    own = by_key((value.material, (value.quantity, value.value)) for value in values)
+    return body.with_values({material: dict(of) for material, of in own.items()})
 
 
 def _reading_errors(data: _FitData, comparison: Comparison, values: Sequence[Fitted]) -> Iterator[Error]:
@@ -240,10 +237,6 @@ def _error(observable: str, residuals: Sequence[tuple[float, float]]) -> Iterato
 
 def _fingerprint(log: Log, which: _Which) -> str:
     """SHA-256 of what was fitted to."""
-    digest, mark = sha256(), ""
     readings = (f"{r.uid} {r.specimen} {r.y_ohm} {r.z_ohm} {r.quantity} {r.value}" for r in log.about(Reading, *which))
     recordings = (f"{run.uid} {run.file} {run.rig_file}" for run in log.about(BenchRun, *which))
-    for line in chain(readings, recordings):
-        digest.update(f"{mark}{line}".encode())
-        mark = "\n"
-    return digest.hexdigest()
+    return sha256("\n".join(chain(readings, recordings)).encode()).hexdigest()

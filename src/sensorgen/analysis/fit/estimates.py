@@ -18,6 +18,7 @@ from sensorgen.analysis.comparison import AllowedValues
 from sensorgen.analysis.comparison.expected import PERMITTIVITY, Movable
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.lazy import by_key
 from sensorgen.core.version import __version__
 from sensorgen.design.materials import FILM_LEAK, SourceValue, source_file
 from sensorgen.prediction.calibration.fitting import Posterior, calibrated
@@ -184,12 +185,9 @@ def text(fit: Fit) -> str:
         f"fit of {fit.of}: {fit.specimens} specimens, {len(fit.held_back)} held back (seed "
         f"{fit.seed}); sensorgen {__version__}; data {fit.log[:16]}"
     )
-    materials: dict[str, list[SourceValue]] = {}
-    for one in fit.values:
-        value = SourceValue(one.quantity, one.value, one.low, one.high, one.note)
-        materials.setdefault(one.material, []).append(value)
+    values = ((v.material, SourceValue(v.quantity, v.value, v.low, v.high, v.note)) for v in fit.values)
     open_ = (f"not determined: {' '.join(f'{untold.parameter}: {untold.why}'.split())}" for untold in fit.untold)
-    return source_file(about, materials, open_)
+    return source_file(about, by_key(values), open_)
 
 
 RESISTIVITY = "resistivity_ohm_m"

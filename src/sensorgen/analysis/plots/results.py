@@ -29,11 +29,12 @@ from sensorgen.checks.review import Review
 from sensorgen.core.arrays import Complex, Mask, Real, Whole
 from sensorgen.core.document import Cell, Table
 from sensorgen.core.errors import OutOfRange
+from sensorgen.core.lazy import by_key
 from sensorgen.core.units import M_PER_MM
 from sensorgen.models.sensor import Response, Sensor
 from sensorgen.prediction.compression import CompressionResult
 from sensorgen.prediction.identifiability.fisher import LeastErrors, Setup, bounds, required, slopes
-from sensorgen.prediction.identifiability.identify import HIGHEST_HZ, surface
+from sensorgen.prediction.identifiability.identify import surface
 from sensorgen.prediction.query import FORCE_N, NOISE
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.sweep import Sweep
@@ -126,12 +127,10 @@ def _panel(table: Table, x: int, y: int, others: Sequence[int]) -> Panel:
 
 def _grouped(table: Table, y: int, others: Sequence[int]) -> dict[str, list[tuple[Any, ...]]]:
     """Rows with a number in a column, by the other settings in words."""
-    groups: dict[str, list[tuple[Any, ...]]] = {}
-    for row in table.cells:
-        if _is_number(row[y]):
-            label = ", ".join(f"{table.columns[k].name} {row[k]}" for k in others)
-            groups.setdefault(label, []).append(row)
-    return groups
+    return by_key(
+        (", ".join(f"{table.columns[k].name} {row[k]}" for k in others), row)
+        for row in table.cells if _is_number(row[y])
+    )  # fmt: skip
 
 
 def _lines(
@@ -234,7 +233,7 @@ def identifiability_figure(
     title : str
         Name of the sensor.
     """
-    setup = Setup(sensor, tuple(frequency_hz), noise, force_n, sensor.length_m / 2, max(HIGHEST_HZ, *frequency_hz))
+    setup = Setup(sensor, tuple(frequency_hz), noise, force_n, sensor.length_m / 2)
     force, place = np.linspace(force_n / FORCES, force_n, FORCES), np.linspace(0.0, sensor.length_m, POSITIONS)
     limits, need = surface(setup, force, place), required(setup)
     panels = (

@@ -19,6 +19,7 @@ from sensorgen.asprinted.printed import Printed
 from sensorgen.checks.review import Review, draw
 from sensorgen.core.document import Part
 from sensorgen.core.findings import headline
+from sensorgen.core.lazy import by_key
 from sensorgen.prediction.identifiability.results import GUESS, Identifiability, Rows, metres, newtons
 from sensorgen.prediction.results import Changes, Prediction, Term
 from sensorgen.scene.drawing.paper import ViewFrame
@@ -75,9 +76,7 @@ def _figure(
     end = min(max(length, 2 * height), _WIDEST * height, view.extent_mm)
     shown = replace(view, end_mm=round(end, 2))
     axis, at = shown.normal, shown.section.at_mm
-    of_drawing: dict[str, list[Outline]] = {}
-    for body, outline in shown.regions:
-        of_drawing.setdefault(body.name, []).append(outline)
+    of_drawing = by_key((body.name, outline) for body, outline in shown.regions)
     of_print = {
         body.name: [part for p in body.pieces for o in p.cut(axis, at) if (part := clipped(o, shown.end_mm))]
         for body in printed.bodies

@@ -3,8 +3,6 @@
 The origin of everything in it is stated.
 """
 
-import csv
-import io
 import json
 import platform
 from collections import Counter
@@ -24,9 +22,10 @@ from sensorgen.analysis.plots.pages import Drawing, PageSection
 from sensorgen.analysis.report import alternating, electrodes, explained, history, recordings, yields
 from sensorgen.checks.review import draw
 from sensorgen.core import yamlfile
-from sensorgen.core.document import Column, Table, plain, safe, spreadsheet
+from sensorgen.core.document import Column, Table, csv_row, plain, safe, spreadsheet
 from sensorgen.core.document import markdown as document
 from sensorgen.core.errors import BadInput
+from sensorgen.core.lazy import by_key
 from sensorgen.core.units import M_PER_MM
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
@@ -88,14 +87,12 @@ def origins(log: Log, comparison: Comparison, *, brief: bool = False) -> Table:
 
 
 def _sources(comparison: Comparison) -> list[Origin]:
-    used: dict[str, set[str]] = {}
-    for of in comparison.predictions.values():
-        for value in of.prediction.values:
-            used.setdefault(value.source, set()).add(f"{value.material} {value.quantity} = {value.value:.6g}")
+    values = (value for of in comparison.predictions.values() for value in of.prediction.values)
+    used = by_key((value.source, f"{value.material} {value.quantity} = {value.value:.6g}") for value in values)
     known = citations() | {SET: "by the design itself"}
     return [
-        Origin("source of values", name, f"{known.get(name, name)}: {', '.join(sorted(values))}")
-        for name, values in sorted(used.items())
+        Origin("source of values", name, f"{known.get(name, name)}: {', '.join(sorted(set(of)))}")
+        for name, of in sorted(used.items())
     ]
 
 
@@ -325,12 +322,11 @@ def comma_separated(report: Report) -> Iterator[str]:
     yield "table,row,column,unit,value\n"
     for table in report.tables:
         for number, row in enumerate(table.cells, 1):
-            target = io.StringIO(newline="")
-            csv.writer(target, lineterminator="\n").writerows(
-                (table.key, number, column.name, column.unit, spreadsheet(cell))
+            named = (table.key, str(number))
+            yield "".join(
+                csv_row((*named, column.name, column.unit, spreadsheet(cell)))
                 for column, cell in zip(table.columns, row, strict=True)
             )
-            yield target.getvalue()
 
 
 class _Listed(list[Any]):

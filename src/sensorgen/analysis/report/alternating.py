@@ -12,6 +12,7 @@ from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.comparison.expected import Predicted
 from sensorgen.analysis.plots.figure import BLUE, GREY, Axis, Curve, Figure, Panel
 from sensorgen.core.document import Cell, Column, some
+from sensorgen.core.lazy import by_key
 from sensorgen.core.units import frequency_text
 from sensorgen.measure import accuracy
 from sensorgen.measure.log import Reading
@@ -158,9 +159,7 @@ def findings(rows: Sequence[AcRow]) -> Iterator[str]:
     for row in rows:
         if row.verdict:
             verdicts.setdefault(row.specimen, {})[row.frequency_hz] = row.verdict
-    sentences: dict[str, list[str]] = {}
-    for specimen, of in verdicts.items():
-        sentences.setdefault(capacitor_from(of), []).append(specimen)
+    sentences = by_key((capacitor_from(of), specimen) for specimen, of in verdicts.items())
     yield from (f"By frequency: {some(names, 8)}: {words}." for words, names in sentences.items())
     if flagged := [row.flag for row in rows if row.flag]:
         kinds = Counter("; ".join(flagged).split("; "))

@@ -91,10 +91,6 @@ def _unconstrained(constrained: Container[str]) -> Iterator[str]:
 
 def _resistances(comparison: Comparison) -> Iterator[MeasurementKind]:
     """Electrodes, and films up to what the meter can tell from an open circuit."""
-
-    def across(ohm: float, parameter: str, value: float) -> float:
-        return min(across_ohm(ohm, value if parameter == LEAK else 0.0), INTACT_OHM)
-
     rows = (
         (v.ry_ohm, v.rz_ohm, row.expected_ohm.value, row.predicted.ry_ohm.value, v.leak_s, not row.evidence.touching)
         for row in usable(comparison) if row.predicted and row.predicted.ry_ohm and row.expected_ohm
@@ -107,7 +103,7 @@ def _resistances(comparison: Comparison) -> Iterator[MeasurementKind]:
     both = known[(known["z"] > 0) & known["apart"]]
     if len(both):
         measured = np.log(np.minimum(both["z"], INTACT_OHM)).astype(complex)
-        yield MeasurementKind("film resistance", measured, _of_electrodes(both["alone"], across))
+        yield MeasurementKind("film resistance", measured, _across(both["alone"]))
 
 
 def _along(known: Any) -> Model:
@@ -128,10 +124,15 @@ def _carried(ohm: Real, leak_s: Real) -> Real:
     return np.asarray((1 + np.tanh(half) / half) / 2)
 
 
-def _of_electrodes(middles: Real, law: Callable[[float, str, float], float]) -> Model:
-    """A law for all electrodes, evaluated once for those that are alike: many readings are of few designs."""
-    distinct, of = np.unique(middles, return_inverse=True)
-    return lambda parameter, value: np.log([complex(law(ohm, parameter, value)) for ohm in distinct.tolist()])[of]
+def _across(alone: Real) -> Model:
+    """Ln of predicted readings across a film, once for electrodes that are alike: many readings are of few designs."""
+    distinct, of = np.unique(alone, return_inverse=True)
+
+    def model(parameter: str, value: float) -> Complex:
+        leak = value if parameter == LEAK else 0.0
+        return np.asarray(np.log([complex(min(across_ohm(ohm, leak), INTACT_OHM)) for ohm in distinct.tolist()])[of])
+
+    return model
 
 
 def _impedances(comparison: Comparison, recorded: Sequence[RecordedRun]) -> Iterator[MeasurementKind]:

@@ -12,6 +12,7 @@ from sensorgen.analysis.plots.figure import BLUE, BROWN, GREY, MOST_POINTS, PURP
 from sensorgen.analysis.report.alternating import BAKED
 from sensorgen.analysis.report.electrodes import VERDICT_COLOURS, reasons, usable
 from sensorgen.core.document import Cell, Column, Part, Table
+from sensorgen.core.lazy import by_key
 from sensorgen.measure.signal.verdicts import ORDER, REACTANCES, WORDS, CountShare, Group, dependence, groups
 from sensorgen.prediction.query import TONES_HZ
 
@@ -46,7 +47,7 @@ DIFFER = 0.05 / len(TESTED)  # p value below which one is affirmed: together wro
 class YieldRow:
     """Specimens that have something in common."""
 
-    by: Annotated[str, Column("grouped by")]
+    by: Annotated[str, Column("by_key by")]
     group: Annotated[str, Column("group")]
     specimens: Annotated[int, Column("specimens")]
     open_electrode: Annotated[int, Column("open electrode")]
@@ -213,10 +214,7 @@ def figures(comparison: Comparison) -> tuple[Figure, ...]:
 
 def _by_shape(rows: Sequence[Compared]) -> Iterator[Curve]:
     """Resistances of the readings, each shape with its look."""
-    by_shape: dict[str, list[Compared]] = {}
-    for row in rows:
-        by_shape.setdefault(row.reading.shape, []).append(row)
-    for shape, here in sorted(by_shape.items()):
+    for shape, here in sorted(by_key((row.reading.shape, row) for row in rows).items()):
         yield Curve(
             "points", shape, [r.verdict.ry_ohm for r in here], [r.verdict.rz_ohm for r in here],
             text=[f"{r.reading.specimen}: {r.verdict.word}" for r in here], **_LOOKS.get(shape, _OTHER),
@@ -294,13 +292,10 @@ class DirectionRow:
 def rows(comparison: Comparison) -> list[DirectionRow]:
     """A row for each shape and film with both directions, two specimens of each at least."""
     last = {row.reading.specimen: row for row in usable(comparison)}
-    groups: dict[tuple[str, float | None], dict[str, list[Compared]]] = {}
-    for row in last.values():
-        words = row.reading.words
-        if words.axes:
-            groups.setdefault((words.shape, words.film_mm), {}).setdefault(words.axes, []).append(row)
+    groups = by_key(((w.shape, w.film_mm), row) for row in last.values() if (w := row.reading.words).axes)
     tests = []
-    for (shape, film_mm), by in sorted(groups.items(), key=lambda item: (item[0][0], item[0][1] is None, item[0][1])):
+    for (shape, film_mm), of in sorted(groups.items(), key=lambda item: (item[0][0], item[0][1] is None, item[0][1])):
+        by = by_key((row.reading.words.axes, row) for row in of)
         if len(by) == 2 and min(map(len, by.values())) > 1:
             (first, ones), (second, others) = sorted(by.items())
             one, other, p = median(_by_plate(ones)), median(_by_plate(others)), rank_p(*map(_by_plate, (ones, others)))
@@ -313,9 +308,7 @@ def rows(comparison: Comparison) -> list[DirectionRow]:
 
 def _by_plate(of: Sequence[Compared]) -> list[float]:
     """Electrode resistances [ohm]: of the specimens of one plate, which are not independent, their median."""
-    plates: dict[str, list[float]] = {}
-    for row in of:
-        plates.setdefault(row.evidence.plate or row.reading.specimen, []).append(row.verdict.ry_ohm)
+    plates = by_key((row.evidence.plate or row.reading.specimen, row.verdict.ry_ohm) for row in of)
     return [median(values) for values in plates.values()]
 
 

@@ -19,11 +19,6 @@ COLUMNS = (
 REST = "rest"
 
 
-def header(given: Sequence[str]) -> str:
-    """Names of the columns, those of the input before."""
-    return verdict.header(given, COLUMNS)
-
-
 def rows(given: Sequence[Sequence[str]], presses: InvertedPresses, rest: Mask) -> str:
     """Rows of a CSV file, blank where nothing was found.
 
@@ -116,36 +111,25 @@ class CalibratedInversion:
         yield from (f"note: {note}" for note in self.notes)
 
 
-class CalibratedSummary:
-    """Counts blocks of results; of widths each block's median is kept."""
+class CalibratedSummary(verdict.Tally):
+    """Counts of results and medians of their widths, block by block."""
 
     def __init__(self) -> None:
-        self._statuses = verdict.Counts(Verdict)
-        self._widths: list[tuple[float, float]] = []
+        super().__init__(Verdict, COLUMNS)
         self.at_rest = 0
-
-    @property
-    def samples(self) -> int:
-        """Readings under load so far."""
-        return self._statuses.samples
 
     def add(self, presses: InvertedPresses, rest: Mask) -> None:
         """Count a block."""
         self.at_rest += int(rest.sum())
-        self._statuses.add(presses.verdict[~rest])
         good = ~rest & np.isfinite(presses.force_n)
-        if good.any():
-            self._widths.append((
-                float(np.median(np.ptp(presses.force_90_n[good], axis=1))),
-                float(np.median(np.ptp(presses.position_90_m[good], axis=1))) / M_PER_MM,
-            ))  # fmt: skip
+        force, place = (np.ptp(ends[good], axis=1) for ends in (presses.force_90_n, presses.position_90_m))
+        self.count(presses.verdict[~rest], force=force, position=place / M_PER_MM)
 
     def result(
         self, of: str, by: int, limit_n: float, length_m: float, noise: float | None, notes: Sequence[str]
     ) -> CalibratedInversion:  # fmt: skip
         """The summary so far."""
-        newtons, mm = np.median(self._widths, axis=0).tolist() if self._widths else (None, None)
         return CalibratedInversion(
-            of, by, self.samples, self.at_rest, self._statuses.by_words(), limit_n, length_m / M_PER_MM, newtons, mm,
-            noise, tuple(notes),
+            of, by, self.samples, self.at_rest, self.by_words(), limit_n, length_m / M_PER_MM, self.median("force"),
+            self.median("position"), noise, tuple(notes),
         )  # fmt: skip

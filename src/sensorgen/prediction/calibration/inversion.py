@@ -168,8 +168,6 @@ class Inverter:
         On force and position; even if not given.
     force_limit_n : float
         Largest force to look for [N].
-    level : float
-        Probability of the intervals [-].
     otherwise : float
         Probability that the press makes a share of a reading alone [-]: the sensor is softer or the tip wider than in
         the calibration, or something else is there, and the frequencies do not separate these. The share is below s
@@ -188,10 +186,9 @@ class Inverter:
 
     def __init__(
         self, model: SpecimenModel, posterior: Posterior, prior: Prior | None = None,
-        force_limit_n: float = FORCE_LIMIT_N, level: float = LEVEL, otherwise: float = 0.0,
-        session: bool = False,
+        force_limit_n: float = FORCE_LIMIT_N, otherwise: float = 0.0, session: bool = False,
     ) -> None:  # fmt: skip
-        self.level, self._otherwise, self._session = level, otherwise, session
+        self.level, self._otherwise, self._session = LEVEL, otherwise, session
         self._posterior, self._length = posterior, model.sensor.length_m
         coarse = np.linspace(0, 1, _COARSE[0]) ** 2 * force_limit_n, np.linspace(0, self._length, _COARSE[1])
         mean, covariance = readings(model, posterior, *coarse)
@@ -287,18 +284,11 @@ class Inverter:
 
     def _put(self, presses: InvertedPresses, rows: Index, readings: _Readings, tones: Mask) -> None:
         columns = np.flatnonzero(np.tile(tones, 2))
-        table = self._table(tones, columns)
-
-        def put(some: Index) -> None:
-            block = self._block(readings.rows(some), table, columns)
-            presses.put(some, replace(block, tones=np.full(len(some), tones.sum())))
-
-        blocks = [rows[start : start + _BLOCK] for start in range(0, len(rows), _BLOCK)]
-        if len(blocks) == 1:
-            put(rows)
-            return
+        table, blocks = self._table(tones, columns), np.split(rows, range(_BLOCK, len(rows), _BLOCK))
         with ThreadPoolExecutor(2) as pool:
-            list(pool.map(put, blocks))
+            of_blocks = pool.map(lambda some: self._block(readings.rows(some), table, columns), blocks)
+            for some, of_block in zip(blocks, of_blocks, strict=True):
+                presses.put(some, replace(of_block, tones=np.full(len(some), tones.sum())))
 
     def _without_one(self, presses: InvertedPresses, rows: Index, readings: _Readings, measured: Mask) -> None:
         """Of readings that no press explains, leave out the tone whose absence explains the most."""
@@ -478,13 +468,10 @@ def _grid(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> tuple[Real
 
 def _refined(coarse: tuple[Real, Real], fine: tuple[Real, Real], values: Real) -> Real:
     """Values on another grid, straight in between: a mean of covariances is one."""
-    shaped: Real = values.reshape(len(coarse[0]), len(coarse[1]), -1)
-    for axis in (0, 1):
-        k = np.clip(np.searchsorted(coarse[axis], fine[axis], side="right") - 1, 0, len(coarse[axis]) - 2)
-        share = (fine[axis] - coarse[axis][k]) / (coarse[axis][k + 1] - coarse[axis][k])
-        share = share.reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
-        shaped = np.take(shaped, k, axis) * (1 - share) + np.take(shaped, k + 1, axis) * share
-    return np.asarray(shaped.reshape(len(fine[0]) * len(fine[1]), *values.shape[1:]))
+    from scipy.interpolate import RegularGridInterpolator
+
+    shaped = values.reshape(len(coarse[0]), len(coarse[1]), *values.shape[1:])
+    return np.asarray(RegularGridInterpolator(coarse, shaped)(np.stack(pairs(*fine), -1)))
 
 
 def _elsewhere(model: SpecimenModel, posterior: Posterior, force_n: float) -> Real:

@@ -14,6 +14,7 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column
 from sensorgen.core.errors import BadInput
+from sensorgen.core.lazy import by_key
 from sensorgen.design.design import Design
 from sensorgen.design.materials import SourceValue, source_file
 from sensorgen.design.values import film, ln_spread, material_value
@@ -106,11 +107,8 @@ def source_text(about: str, estimates: Sequence[MaterialEstimate]) -> str:
     told = [one for one in estimates if one.told]
     if not told:
         raise BadInput(f"{about}: the readings tell no material value; known presses tell them")
-    materials: dict[str, list[SourceValue]] = {}
-    for one in told:
-        value = SourceValue(one.quantity, one.value, one.lower, one.upper)
-        materials.setdefault(one.material, []).append(value)
-    return source_file(about, materials)
+    values = ((one.material, SourceValue(one.quantity, one.value, one.lower, one.upper)) for one in told)
+    return source_file(about, by_key(values))
 
 
 def links(predicted: SensorModel) -> tuple[Link, ...]:

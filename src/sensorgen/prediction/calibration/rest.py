@@ -102,9 +102,7 @@ class Baseline:
         """
         columns = np.flatnonzero(np.tile(np.isfinite(z_ohm), 2))
         off = parts(np.log(z_ohm) - self._ln_z)[columns]
-        covariance = self._covariance + np.diag(
-            np.broadcast_to(np.tile(noise, 2 if np.ndim(noise) else 1), len(self._covariance)) ** 2
-        )
+        covariance = self._covariance + np.diag(np.resize(noise, len(self._covariance)) ** 2)
         weights, inverse = self._weights[columns], np.linalg.inv(covariance[np.ix_(columns, columns)])
         variance = np.linalg.pinv(weights.T @ inverse @ weights)
         ln_cr = variance @ weights.T @ inverse @ off

@@ -18,7 +18,7 @@ from sensorgen.models import line
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import bodies
 from sensorgen.prediction.inference import NORMAL_90, Parameter, Samples, parts, slopes
-from sensorgen.prediction.inverse.forward import Forward, tones
+from sensorgen.prediction.inverse.forward import bearable_n, tones
 from sensorgen.prediction.query import TONES_HZ, Query, Tip
 from sensorgen.prediction.sensor_model import SensorModel, sensor_model
 
@@ -188,7 +188,7 @@ class SpecimenModel:
     def most_pa(self) -> float:
         """Pressure up to which the law of compression reaches; beyond, the rise goes on in proportion [Pa]."""
         sensor = self.sensor
-        return Forward(sensor, self.frequency_hz).force_limit_n(_FAR_N) / (sensor.width_m * sensor.tip_m / 2)
+        return bearable_n(sensor, _FAR_N) / (sensor.width_m * sensor.tip_m / 2)
 
     @cached_property
     def _shapes(self) -> Real:
@@ -227,7 +227,7 @@ class SpecimenModel:
         if frequency_hz is not None:
             at = np.array(at)
             at[..., [self._at["lead"], self._at["stray"]]] = -np.inf
-        return np.asarray(self._read(at, nothing, (False,), frequency_hz=frequency_hz)[0, ..., 0, :])
+        return self._read(at, nothing, down=False, frequency_hz=frequency_hz)[..., 0, :]
 
     def ratio(self, at: Real, presses: Presses, changes: Real | None = None) -> Complex:
         """Ln of pressed over rest.
@@ -246,11 +246,7 @@ class SpecimenModel:
         (..., n, m) array
         """
         # at rest, too, cut where the tip would be: what the cuts leave of a profile cancels
-        if changes is None:
-            pressed, free = self._read(at, presses, (True, False))
-        else:  # since the rest reading
-            pressed, free = self._read(at, presses, (True,), changes)[0], self._read(at, presses, (False,))[0]
-        return np.asarray(pressed - free)
+        return np.asarray(self._read(at, presses, changes) - self._read(at, presses, down=False))
 
     def _pressed(
         self, at: Real, value: Mapping[str, Real], presses: Presses, length_m: Real, rise: Real
@@ -270,10 +266,10 @@ class SpecimenModel:
         return 1 + share / (1 - share) * beyond * value["rise"] * np.exp(ln_rise), stress
 
     def _read(
-        self, at: Real, presses: Presses, loads: Sequence[bool], changes: Real | None = None,
+        self, at: Real, presses: Presses, changes: Real | None = None, *, down: bool = True,
         frequency_hz: Real | None = None,
     ) -> Complex:  # fmt: skip
-        """Ln of the impedance that the bench reads, with the tip down or not, along the first axis."""
+        """Ln of the impedance that the bench reads, with the tip down or not."""
         sensor = self.sensor
         value = {name: self.value(name, at)[..., None] for name in self.names}
         rise, c, r = np.moveaxis(np.zeros(3) if changes is None else changes, -1, 0)[..., None]
@@ -290,10 +286,10 @@ class SpecimenModel:
         tracks = [(whole * bent)[..., None] for bent in np.exp(self._bent(value, ends[:-1], ends[1:]))]
         films, lengths = [leak + stored] * len(tracks), [one[..., None] for one in np.diff(ends, axis=0)]
         stray, lead = (value[name][..., None] for name in ("stray", "lead"))
-        lifted, stress = self._pressed(at, value, presses, length, rise)
-        down = np.reshape(loads, (-1, *[1] * (lifted.ndim + 1)))
-        films[_PIECES] = leak + stored * np.where(down, lifted[..., None], 1.0)
-        tracks[_PIECES] = tracks[_PIECES] + down * (stress * by_pressure)[..., None]
+        if down:
+            lifted, stress = self._pressed(at, value, presses, length, rise)
+            films[_PIECES] = leak + stored * lifted[..., None]
+            tracks[_PIECES] = tracks[_PIECES] + (stress * by_pressure)[..., None]
         z = line.cascade(tracks, films, lengths, sensor.far_end)
         return np.asarray(np.log(lead + 1 / (1 / z + 1j * omega * stray)))
 

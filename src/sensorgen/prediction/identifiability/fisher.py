@@ -20,6 +20,8 @@ from sensorgen.prediction.identifiability import results
 from sensorgen.prediction.identifiability.results import GUESS, finite, metres, newtons
 from sensorgen.prediction.inference import cramer_rao, orthogonal
 
+HIGHEST_HZ = 1e6  # assumed of the bridge; its oscilloscope (TiePie HS5-540) reaches far more
+
 
 class Slopes(NamedTuple):
     """Relative derivatives of Z, frequencies on the last axis."""
@@ -50,8 +52,6 @@ class Setup:
         Standard deviation of Re Z and of Im Z, each, relative to abs(Z) [-].
     force_n, position_m : float
         The press: force [N], centre of the tip [m].
-    highest_hz : float
-        Highest frequency of the instrument [Hz].
     assumed : str
         Assumption on the law of compression of a cell that was not solved, or "".
     """
@@ -61,8 +61,19 @@ class Setup:
     noise: float
     force_n: float
     position_m: float
-    highest_hz: float
     assumed: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse readings that are none."""
+        if not self.frequency_hz:
+            raise OutOfRange("no frequencies to read the sensor at: expected at least one frequency")
+        if not 0 < self.noise < np.inf:
+            raise OutOfRange(f"noise is {self.noise:g}; expected a number above 0")
+
+    @property
+    def highest_hz(self) -> float:
+        """Highest frequency of the instrument [Hz]."""
+        return max(HIGHEST_HZ, *self.frequency_hz)
 
     def bounds(self) -> LeastErrors:
         """Bounds of the press by these readings."""

@@ -223,7 +223,6 @@ CHANGES = (
 )  # fmt: skip
 
 
-HIGHEST_HZ = 1e6  # assumed of the bridge; its oscilloscope (TiePie HS5-540) reaches far more
 LIGHT_N = 1.0  # smaller forces do not count in the shares of presses that are known
 MAP_FORCES, MAP_POSITIONS = 7, 21
 
@@ -235,7 +234,6 @@ def identify(
     *,
     force_n: float = FORCE_N,
     position_m: float | None = None,
-    highest_hz: float = HIGHEST_HZ,
     stiffest: Sensor | None = None,
     assumed: str = "",
 ) -> results.Identifiability:
@@ -253,8 +251,6 @@ def identify(
         Reference force, and the greatest of the map [N].
     position_m : float
         Centre of the tip; the middle of the sensor unless given [m].
-    highest_hz : float
-        Highest frequency of the instrument [Hz].
     stiffest : Sensor
         The same sensor by its stiffest law of compression, where ``sensor`` has the softest (a plate).
     assumed : str
@@ -271,12 +267,12 @@ def identify(
     force or less, a press *located* where it is the tip's length or less; a quantity is not sensed where the error is
     that of a uniform distribution (range over the root of 12), and "roughly" in between.
     """
-    setup = replace(_setup(sensor, frequency_hz, noise, force_n, position_m, highest_hz), assumed=assumed)
+    centre = sensor.length_m / 2 if position_m is None else position_m
+    setup = Setup(sensor, tuple(map(float, frequency_hz)), noise, force_n, centre, assumed)
     slopes = fisher.slopes(sensor, setup.frequency_hz, force_n, setup.position_m)
     limits, need, reason = fisher.bounds(slopes, noise), fisher.required(setup), fisher.undefined(setup, slopes)
     helpful = most_helpful(setup, need)
     combined = together(setup, helpful) if helpful else None
-    stiff = setup.on(stiffest).bounds() if stiffest else None
     calibrated, uncalibrated = _on_a_bench(setup)
     return results.Identifiability(
         **vars(fisher.standard_errors(limits)), noise=noise, press=_press(setup),
@@ -285,15 +281,17 @@ def identify(
         senses_force=None if assumed else need.force(float(limits.force_n)),
         locates=None if assumed else need.position(float(limits.position_m)),
         verdict=fisher.verdict(setup, limits, need, reason),
-        stiffest=results.Stiffest(
-            **vars(fisher.standard_errors(stiff)), verdict=fisher.bracket(limits, stiff, need)
-        ) if stiff else None,
+        stiffest=_stiffest(setup.on(stiffest).bounds(), limits, need) if stiffest else None,
         frequencies=_frequencies(setup, slopes), map=_map(setup, need),
         best_frequencies=fisher.best(setup, slopes, need), advised_frequencies=fisher.advised(setup, need),
         changes=tuple(one.result() for one in helpful),
         changes_together=fisher.standard_errors(combined) if combined else None,
         calibrated=calibrated, uncalibrated=uncalibrated,
     )  # fmt: skip
+
+
+def _stiffest(stiff: LeastErrors, free: LeastErrors, need: Required) -> results.Stiffest:
+    return results.Stiffest(**vars(standard_errors(stiff)), verdict=fisher.bracket(free, stiff, need))
 
 
 def _press(setup: Setup) -> results.ReferencePress:
@@ -303,36 +301,20 @@ def _press(setup: Setup) -> results.ReferencePress:
     return results.ReferencePress(setup.force_n, setup.position_m, sensor.tip_m, float(stress), strain)
 
 
-def _on_a_bench(setup: Setup) -> tuple[results.StandardErrors, results.StandardErrors] | tuple[None, None]:
+def _on_a_bench(setup: Setup) -> tuple[results.StandardErrors | None, ...]:
     """Errors of a specimen, with a calibration and without."""
     from sensorgen.prediction.calibration.next_press import outlook
 
     errors = outlook(setup.sensor, np.array(setup.frequency_hz), setup.noise, setup.force_n, setup.position_m)
-    if errors is None:
-        return None, None
-    calibrated, uncalibrated = (
+    return tuple(
         results.StandardErrors(sigma_force_n=_rounded(force), sigma_position_m=_rounded(position))
         for force, position in np.array(errors).tolist()
-    )
-    return calibrated, uncalibrated
+    ) if errors else (None, None)  # fmt: skip
 
 
 def _rounded(error: float) -> float | None:
     """A standard error to four digits, the same on every machine; None of an infinite one."""
     return float(f"{error:.4g}") if np.isfinite(error) else None
-
-
-def _setup(
-    sensor: Sensor, given: Sequence[float], noise: float, force_n: float, position_m: float | None, highest_hz: float
-) -> Setup:
-    frequency_hz = tuple(float(f) for f in given)
-    if not frequency_hz:
-        raise OutOfRange("no frequencies to read the sensor at: expected at least one frequency")
-    for name, value in (("noise", noise), ("the instrument's highest frequency", highest_hz)):
-        if not 0 < value < np.inf:
-            raise OutOfRange(f"{name} is {value:g}; expected a number above 0")
-    centre = sensor.length_m / 2 if position_m is None else position_m
-    return Setup(sensor, frequency_hz, noise, force_n, centre, max(highest_hz, *frequency_hz))
 
 
 def _frequencies(setup: Setup, slopes: fisher.Slopes) -> tuple[results.FrequencyInformation, ...]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -19,11 +18,6 @@ COLUMNS = (
 )  # fmt: skip
 _MM = 1 / M_PER_MM
 _DIAGONAL = np.arange(2)
-
-
-def header(given: Sequence[str]) -> str:
-    """Names of the columns, those of the input before."""
-    return verdict.header(given, COLUMNS)
 
 
 def rows(given: Sequence[Sequence[str]], estimates: Estimates, *, prior: bool = False) -> str:
@@ -104,8 +98,8 @@ class InversionSummary:
         yield from self.advice
 
 
-class Summary:
-    """Counts blocks of estimates; of standard errors each block's median is kept.
+class Summary(verdict.Tally):
+    """Counts of estimates and medians of their errors, block by block.
 
     Parameters
     ----------
@@ -116,58 +110,37 @@ class Summary:
     """
 
     def __init__(self, estimator: Estimator, doubts: Sequence[str] = ()) -> None:
+        super().__init__(Status, COLUMNS)
         self._estimator, self._doubts = estimator, (*doubts, *estimator.doubts)
-        self._statuses = verdict.Counts(Status)
-        self._errors: list[tuple[float, float]] = []
-        self._excess: list[float] = []
-
-    @property
-    def samples(self) -> int:
-        """Number of samples so far."""
-        return self._statuses.samples
 
     def add(self, estimates: Estimates) -> None:
         """Count a block."""
-        self._statuses.add(estimates.status)
-        measured, free = estimates.tones > 0, estimates.tones > 1
-        if measured.any():
-            force, position = np.median(np.sqrt(estimates.covariance[measured][:, _DIAGONAL, _DIAGONAL]), 0).tolist()
-            self._errors.append((force, position * _MM))
-        if free.any():
-            self._excess.append(float(np.median(np.sqrt(estimates.chi2[free] / (2 * estimates.tones[free] - 2)))))
+        free = estimates.tones > 1
+        force, position = np.sqrt(estimates.covariance[estimates.tones > 0][:, _DIAGONAL, _DIAGONAL]).T
+        excess = np.sqrt(estimates.chi2[free] / (2 * estimates.tones[free] - 2))
+        self.count(estimates.status, force=force, position=position * _MM, excess=excess)
 
     def result(self) -> InversionSummary:
         """The summary so far."""
         return InversionSummary(
-            samples=self.samples,
-            statuses=self._statuses.by_words(),
-            frequency_hz=tuple(self._estimator.frequency_hz.tolist()),
-            force_limit_n=float(self._estimator.scale[0]),
-            median_force_error_n=_middle([force for force, _ in self._errors]),
-            median_position_error_mm=_middle([position for _, position in self._errors]),
-            median_residual_over_noise=_middle(self._excess),
-            doubts=self._doubts,
-            advice=tuple(self._advice()),
-        )
+            samples=self.samples, statuses=self.by_words(), frequency_hz=tuple(self._estimator.frequency_hz.tolist()),
+            force_limit_n=float(self._estimator.scale[0]), median_force_error_n=self.median("force"),
+            median_position_error_mm=self.median("position"), median_residual_over_noise=self.median("excess"),
+            doubts=self._doubts, advice=tuple(self._advice()),
+        )  # fmt: skip
 
     def _advice(self) -> Iterator[str]:
         """Advice where most samples have the same problem."""
-        excess = _middle(self._excess)
-        if self._statuses.most(Status.NO_FIT) and excess is not None:
+        excess = self.median("excess")
+        if self.most(Status.NO_FIT) and excess is not None:
             yield (
                 f"most readings fit no press: residuals are {excess:.3g} times the noise; set a larger --noise if it "
                 "is noise, or another design or material source if it is not"
             )
-        if self._statuses.most(Status.NOT_IDENTIFIABLE, Status.FORCE_ONLY):
+        if self.most(Status.NOT_IDENTIFIABLE, Status.FORCE_ONLY):
             yield (
                 "most readings have too little information: average them, choose frequencies nearer to the "
                 "corner frequency, more resistive electrodes or a softer cell (see sensorgen predict), or set --prior"
             )
-        if self._statuses.most(Status.AT_THE_END):
+        if self.most(Status.AT_THE_END):
             yield "most presses lie at the limits of the search: check --force-limit, and which end is connected"
-
-
-def _middle(values: Sequence[float]) -> float | None:
-    """Median, None where there is none or it is infinite."""
-    middle = median(values) if values else np.inf
-    return middle if middle < np.inf else None

@@ -5,8 +5,7 @@ Least squares of presses on the unit square, many samples together; with a prior
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,60 +13,49 @@ from numpy.typing import ArrayLike, NDArray
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction import inference
-from sensorgen.prediction.inference import NORMAL_90, Index, LocalFit, Samples, parts
-from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Forward, Local, ResponseTable
-from sensorgen.prediction.inverse.verdict import PAIR, Status, covariance, statuses
+from sensorgen.prediction.inference import NORMAL_90, Index, LeastSquares, LocalFit, Samples, descend, parts
+from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Local, ResponseTable, bearable_n, log_impedance, tones
+from sensorgen.prediction.inverse.verdict import PAIR, covariance, statuses
 
 LOOSE, TIGHT = 0.2, 0.01  # share of the residual that a step still removes when a sample is done (Bates and Watts 1981)
 REACH = 0.1  # farthest that one step moves the position: beyond it the response is not linear
 ROUNDING = 1e-14  # of ln Z: what no step can remove
 _FLOOR = 1e-9  # least information on the square's edge: keeps a singular matrix solvable, far below any reading's own
 
-Model = Callable[[Real], Local]
-
 
 @dataclass(frozen=True)
-class FitGoal:
-    """Goal of a fit: responses with their weights, and a normal prior.
+class FitGoal(LeastSquares):
+    """Responses to be explained by presses in the unit square, which no step leaves, with a normal prior.
 
     Attributes
     ----------
     response, weight : (n, 2 n_tones) array
         Measured ln Z; 1/sigma, 0 where it is missing.
-    expected, information : (2,), (2, 2) array
+    expected, prior : (2,), (2, 2) array
         The prior's mean, scaled, and the inverse of its covariance, 0 where it is uniform.
+    model : callable
+        Response and derivatives at scaled presses.
+    offset : float
+        Share of the residual at which a sample is done, below noise the residual's share of that [-].
     """
 
     response: Real
     weight: Real
     expected: Real
-    information: Real
-
-    def rows(self, rows: Index) -> "FitGoal":
-        """Some of the samples."""
-        return FitGoal(self.response[rows], self.weight[rows], self.expected, self.information)
-
-    def fit(self, press: Real, local: Local) -> LocalFit:
-        """Fit of the responses by presses."""
-        residual = (self.response - local.value) * self.weight
-        return LocalFit.of(press, residual, local.slope * self.weight[:, None]).with_prior(
-            self.expected, self.information
-        )
-
-
-@dataclass(frozen=True)
-class _Presses(inference.LeastSquares):
-    """Responses to be explained by presses in the unit square, which no step leaves."""
-
-    target: FitGoal
-    model: Model
+    prior: Real
+    model: Callable[[Real], Local]
     offset: float
     damping = 1e-3
 
+    def rows(self, rows: Index) -> "FitGoal":
+        """Some of the samples."""
+        return replace(self, response=self.response[rows], weight=self.weight[rows])
+
     def fit(self, at: Real, rows: Index) -> LocalFit:
         """Fit of some samples by presses."""
-        return self.target.rows(rows).fit(at, self.model(at))
+        local, weight = self.model(at), self.weight[rows]
+        residual = (self.response[rows] - local.value) * weight
+        return LocalFit.of(at, residual, local.slope * weight[:, None]).with_prior(self.expected, self.prior)
 
     def step(self, fit: LocalFit, damping: Real) -> Real:
         """Step to the least squares of the linear model; along an edge where it would leave the square."""
@@ -86,25 +74,8 @@ class _Presses(inference.LeastSquares):
 
     def done(self, fit: LocalFit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
         """Samples within the accuracy asked for; one far below noise goes on to the end."""
-        rounding = ROUNDING**2 * np.einsum("nk,nk->n", self.target.weight[rows], self.target.weight[rows])
+        rounding = ROUNDING**2 * np.einsum("nk,nk->n", self.weight[rows], self.weight[rows])
         return np.asarray(gain <= self.offset**2 * fit.chi2 * np.minimum(fit.chi2, 1.0) + rounding)
-
-
-def descend(target: FitGoal, model: Model, start: Real, offset: float) -> LocalFit:
-    """Least squares from a start in the unit square.
-
-    Parameters
-    ----------
-    target : FitGoal
-        Responses and prior.
-    model : callable
-        Response and derivatives at scaled presses.
-    start : (n, 2) array
-        Scaled presses [-].
-    offset : float
-        Share of the residual at which a sample is done, below noise the residual's share of that [-].
-    """
-    return inference.descend(_Presses(target, model, offset), start)
 
 
 def _inside(at: Real, step: Real) -> Real:
@@ -164,7 +135,7 @@ class PressPosterior(Samples):
     """(n, 2): 95 % lie below."""
 
 
-def posterior(target: FitGoal, table: ResponseTable, fit: LocalFit) -> PressPosterior:
+def posterior(goal: FitGoal, fit: LocalFit) -> PressPosterior:
     """Posterior means, covariances and 90 % intervals of scaled presses.
 
     Positions are spread over what the fit leaves open, at each of them forces over what that position leaves open: the
@@ -172,28 +143,25 @@ def posterior(target: FitGoal, table: ResponseTable, fit: LocalFit) -> PressPost
 
     Parameters
     ----------
-    target : FitGoal
-        The responses, and the prior.
-    table : ResponseTable
-        The sensor.
+    goal : FitGoal
+        The responses, the prior, and the sensor.
     fit : LocalFit
         Its least squares.
     """
     n = len(fit.at)
     blocks = np.split(np.arange(n), range(_QUADRATURES, n, _QUADRATURES))
-    return PressPosterior.joined([_posterior(target.rows(rows), table, fit.rows(rows)) for rows in blocks])
+    return PressPosterior.joined([_posterior(goal.rows(rows), fit.rows(rows)) for rows in blocks])
 
 
-def _posterior(target: FitGoal, table: ResponseTable, fit: LocalFit) -> PressPosterior:
+def _posterior(goal: FitGoal, fit: LocalFit) -> PressPosterior:
     information = fit.information + np.eye(2) * GUESS_INFORMATION
     deviation = np.sqrt(np.linalg.inv(information)[:, 1, 1])
     x, dx = _spread(fit.at[:, 1], deviation, _POSITIONS)
     repeated = np.repeat(np.arange(len(x)), _POSITIONS)
-    ridge, width = _ridge(target.rows(repeated), table, np.repeat(fit.at[:, 0], _POSITIONS), x.ravel())
+    ridge, width = _ridge(goal, repeated, np.repeat(fit.at[:, 0], _POSITIONS), x.ravel())
     force, df = _spread(ridge, width, _FORCES)
-    every = np.repeat(repeated, _FORCES)
     press = np.stack([force.ravel(), np.repeat(x.ravel(), _FORCES)], -1)
-    chi2 = target.rows(every).fit(press, table.at(press)).chi2.reshape(len(x), -1)
+    chi2 = goal.fit(press, np.repeat(repeated, _FORCES)).chi2.reshape(len(x), -1)
     weight = np.exp((chi2.min(1, keepdims=True) - chi2) / 2) * np.repeat(df.reshape(x.shape), _FORCES, 1) * dx[:, None]
     return _moments(press.reshape(len(x), -1, 2), weight / weight.sum(1, keepdims=True))
 
@@ -205,11 +173,10 @@ def _spread(middle: Real, deviation: Real, count: int) -> tuple[Real, Real]:
     return low[:, None] + step[:, None] * (np.arange(count) + 0.5), step
 
 
-def _ridge(target: FitGoal, table: ResponseTable, force: Real, position: Real) -> tuple[Real, Real]:
+def _ridge(goal: FitGoal, rows: Index, force: Real, position: Real) -> tuple[Real, Real]:
     """The most probable force at each position, and its standard error."""
     for _ in range(_STEPS):
-        press = np.stack([force, position], -1)
-        fit = target.fit(press, table.at(press))
+        fit = goal.fit(np.stack([force, position], -1), rows)
         information = fit.information[:, 0, 0] + GUESS_INFORMATION
         force = np.clip(force + fit.gradient[:, 0] / information, 0.0, 1.0)
     return force, 1 / np.sqrt(information)
@@ -272,23 +239,6 @@ class Estimates(Samples):
     other_position_m: Real
 
 
-class PressEstimate(NamedTuple):
-    """One estimate of a stream, as those of a batch [N], [m]."""
-
-    force_n: float
-    position_m: float
-    covariance: Real
-    status: Status
-
-
-class _Pair(NamedTuple):
-    """The best presses of a block, and others that explain it as well: rows and scaled presses."""
-
-    best: LocalFit
-    rows: Index
-    others: Real
-
-
 class Estimator:
     """Weighted least squares over all frequencies, prepared for one sensor.
 
@@ -300,7 +250,7 @@ class Estimator:
         The sensor.
     frequency_hz : (n_tones,) array
         Frequencies [Hz].
-    noise : float or (n_tones,) array
+    noise : float
         Standard deviation of the real and of the imaginary part of Z, each relative to its magnitude [-].
     prior : Prior, optional
         With it the answer is the posterior's mean and covariance.
@@ -317,23 +267,24 @@ class Estimator:
     >>> from sensorgen.models.compression import unconfined
     >>> sensor = Sensor(0.1, 0.01, (3e-4, 3e-4), (5.0, 5.0), 7.6e-10, unconfined(6e5))
     >>> estimator = Estimator(sensor, [1e3, 1e4, 1e5])
-    >>> found = estimator.one(sensor.impedance(np.array([1e3, 1e4, 1e5]), 3.0, 0.06))
-    >>> round(found.force_n, 6), round(found.position_m * 1e3, 6), found.status.words
-    (3.0, 60.0, 'ok')
+    >>> presses = estimator.batch(sensor.impedance(np.array([1e3, 1e4, 1e5]), 3.0, 0.06)[None])
+    >>> presses.force_n.round(6).tolist(), presses.position_m.round(6).tolist(), presses.status.tolist()
+    ([3.0], [0.06], [0])
     """
 
     def __init__(
         self,
         sensor: Sensor,
         frequency_hz: ArrayLike,
-        noise: ArrayLike = NOISE,
+        noise: float = NOISE,
         prior: Prior | None = None,
         force_limit_n: float = FORCE_LIMIT_N,
     ) -> None:
-        self._forward = Forward(sensor, frequency_hz)
-        self.frequency_hz, self.prior = self._forward.frequency_hz, prior
-        self._sigma = _noise(noise, len(self.frequency_hz))
-        self._table = ResponseTable(self._forward, self._forward.force_limit_n(force_limit_n))
+        self._sensor, self.frequency_hz, self.prior = sensor, tones(frequency_hz), prior
+        if not 0 < noise <= _MOST_NOISE:
+            raise OutOfRange(f"a noise of {noise:g}; expected above 0 and up to 1, the share of the impedance")
+        self._sigma = noise
+        self._table = ResponseTable(sensor, self.frequency_hz, bearable_n(sensor, force_limit_n))
         self.scale = self._table.scale
         rival, gap = self._table.rivals(self._sigma)
         self._rival = np.where(gap < _RIVAL, rival, -1)
@@ -345,12 +296,6 @@ class Estimator:
         if len(self.frequency_hz) > 1:
             return ()
         return ("one frequency gives two numbers for two unknowns: bad readings cannot be detected",)
-
-    def one(self, impedance_ohm: ArrayLike) -> PressEstimate:
-        """The press behind one reading (n_tones,) [ohm]; errors as :meth:`batch`."""
-        estimates = self._block(self._readings(np.asarray(impedance_ohm)[None]))
-        force, position, status = estimates.force_n[0], estimates.position_m[0], Status(int(estimates.status[0]))  # type: ignore[call-arg]
-        return PressEstimate(float(force), float(position), estimates.covariance[0], status)
 
     def batch(self, impedance_ohm: ArrayLike) -> Estimates:
         """The presses behind readings (n, n_tones) [ohm].
@@ -384,86 +329,57 @@ class Estimator:
         measured = np.isfinite(z) & (z != 0)
         response = parts(np.log(np.where(measured, z, 1.0)))
         weight = np.tile(measured, 2) / self._sigma
-        target = FitGoal(response, weight, self._expected, self._information)
-        pair = self._least_squares(target)
-        own = covariance(pair.best.information - self._information)
-        tones = measured.sum(1)
-        ambiguous = np.zeros(len(z), bool)
-        ambiguous[pair.rows] = True
-        status = statuses(pair.best, own[:, _DIAGONAL, _DIAGONAL], tones, ambiguous)
-        return self._in_si(pair, self._known(target, pair.best), status, tones)
+        goal = FitGoal(response, weight, self._expected, self._information, self._table.at, LOOSE)
+        best, others = self._least_squares(goal)
+        own = covariance(best.information - self._information)
+        tones, known = measured.sum(1), self._known(goal, best)
+        status = statuses(best, own[:, _DIAGONAL, _DIAGONAL], tones, np.isfinite(others[:, 0]))
+        mean, low, high, other = (
+            np.where(tones[:, None], of, np.nan) * self.scale for of in (known.mean, known.low, known.high, others)
+        )
+        force_90, position_90 = np.stack([low, high], -1).transpose(1, 0, 2)
+        return Estimates(
+            force_n=mean[:, 0], position_m=mean[:, 1], force_90_n=force_90, position_90_m=position_90, status=status,
+            covariance=known.covariance * np.outer(self.scale, self.scale), chi2=best.chi2, tones=tones,
+            other_force_n=other[:, 0], other_position_m=other[:, 1],
+        )  # fmt: skip
 
-    def _known(self, target: FitGoal, fit: LocalFit) -> PressPosterior:
+    def _known(self, goal: FitGoal, fit: LocalFit) -> PressPosterior:
         """Means, covariances and intervals of scaled presses."""
         if self.prior is not None:
-            return posterior(target, self._table, fit)
+            return posterior(goal, fit)
         spread = covariance(fit.information)
         reach = NORMAL_90 * np.sqrt(spread[:, _DIAGONAL, _DIAGONAL])
         return PressPosterior(fit.at, spread, fit.at - reach, fit.at + reach)
 
-    def _least_squares(self, target: FitGoal) -> _Pair:
-        table = self._table
-        start = table.nearest(target.response, target.weight)
-        best = descend(target, self._exact, descend(target, table.at, start, LOOSE).at, TIGHT)
-        rival = self._rival[table.cell(best.at)]
+    def _least_squares(self, goal: FitGoal) -> tuple[LocalFit, Real]:
+        """The best presses, and others that explain the readings as well, scaled (n, 2); nan where there are none."""
+        table, exact = self._table, replace(goal, model=self._exact, offset=TIGHT)
+        best = descend(exact, descend(goal, table.nearest(goal.response, goal.weight)).at)
+        others, rival = np.full_like(best.at, np.nan), self._rival[table.cell(best.at)]
         rows = np.flatnonzero(rival >= 0)
-        if not rows.size:
-            return _Pair(best, rows, np.empty((0, 2)))
-        second = descend(target.rows(rows), table.at, table.middles[rival[rows]], LOOSE)
-        close = np.flatnonzero(second.chi2 < best.chi2[rows] + 2 * PAIR)
-        rows = rows[close]
-        second = descend(target.rows(rows), self._exact, second.at[close], TIGHT)
-        won = np.flatnonzero(second.chi2 < best.chi2[rows])
-        first = best.rows(rows[won])
-        best.put(rows[won], second.rows(won))
-        second.put(won, first)
-        return _within_noise(best, rows, second)
+        if rows.size:
+            second = descend(goal.rows(rows), table.middles[rival[rows]])
+            close = np.flatnonzero(second.chi2 < best.chi2[rows] + 2 * PAIR)
+            rows = rows[close]
+            second = descend(exact.rows(rows), second.at[close])
+            won = np.flatnonzero(second.chi2 < best.chi2[rows])
+            first = best.rows(rows[won])
+            best.put(rows[won], second.rows(won))
+            second.put(won, first)
+            as_well = _within_noise(best.rows(rows), second)
+            others[rows[as_well]] = second.at[as_well]
+        return best, others
 
     def _exact(self, press: Real) -> Local:
         """The exact response; its derivatives from the table."""
         force, position = (press * self.scale).T
-        exact = parts(self._forward.log_impedance(force, np.minimum(position, self.scale[1])))
+        exact = parts(log_impedance(self._sensor, self.frequency_hz, force, np.minimum(position, self.scale[1])))
         return Local(exact, self._table.at(press).slope)
 
-    def _in_si(
-        self, pair: _Pair, known: PressPosterior, status: NDArray[np.uint8], tones: NDArray[np.intp]
-    ) -> Estimates:
-        empty = status == Status.MISSING
-        others = np.full((len(tones), 2), np.nan)
-        others[pair.rows] = pair.others
-        mean, low, high = (
-            np.where(empty[:, None], np.nan, a) * self.scale for a in (known.mean, known.low, known.high)
-        )
-        return Estimates(
-            force_n=mean[:, 0],
-            position_m=mean[:, 1],
-            covariance=known.covariance * np.outer(self.scale, self.scale),
-            force_90_n=np.stack([low[:, 0], high[:, 0]], -1),
-            position_90_m=np.stack([low[:, 1], high[:, 1]], -1),
-            status=status,
-            chi2=pair.best.chi2,
-            tones=tones,
-            other_force_n=others[:, 0] * self.scale[0],
-            other_position_m=others[:, 1] * self.scale[1],
-        )
 
-
-def _within_noise(best: LocalFit, rows: Index, second: LocalFit) -> _Pair:
-    """Those second presses that are presses of their own and explain the reading as well."""
-    first = best.rows(rows)
+def _within_noise(first: LocalFit, second: LocalFit) -> Mask:
+    """Second presses that are presses of their own and explain the reading as well."""
     apart = second.at - first.at
     distance = np.einsum("ni,nij,nj->n", apart, first.information, apart)
-    real = (second.chi2 < first.chi2 + PAIR) & (distance > PAIR)
-    return _Pair(best, rows[real], second.at[real])
-
-
-def _noise(noise: ArrayLike, n_tones: int) -> Real:
-    """Standard deviations of the 2 n_tones parts."""
-    try:
-        sigma = np.broadcast_to(np.asarray(noise, np.float64), n_tones)
-    except (TypeError, ValueError):
-        raise BadInput(f"noise is one number, or one per frequency ({n_tones}), not {str(noise)[:60]!r}") from None
-    bad = ~((sigma > 0) & (sigma <= _MOST_NOISE))
-    if bad.any():
-        raise OutOfRange(f"a noise of {sigma[bad][0]:g}; expected above 0 and up to 1, the share of the impedance")
-    return np.tile(sigma, 2)
+    return np.asarray((second.chi2 < first.chi2 + PAIR) & (distance > PAIR))

@@ -1,4 +1,4 @@
-"""Forward model of one sensor at fixed frequencies: exact, and as a table in which responses are looked up.
+"""Forward model of one sensor at fixed frequencies, as a table in which responses are looked up.
 
 In the table everything is scaled: force by its limit, position by the sensor's length, so that a press is a point of
 the unit square. The table only has to lead to the solution; the exact model has the last word.
@@ -7,84 +7,47 @@ the unit square. The table only has to lead to the solution; the exact model has
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.models import line, refusal
+from sensorgen.models import refusal
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.inference import Index, parts
-from sensorgen.solvers.line.inputs import far_load
 
 FORCE_LIMIT_N = 13.0  # the rig's largest force, thesis chapter 6
 _HALVINGS = 40
 
 
-class Forward:
-    """Exact ln Z of a sensor at its frequencies, for one press per row.
+def log_impedance(sensor: Sensor, frequency_hz: Real, force_n: Real, position_m: Real) -> Complex:
+    """Natural logarithm of Z/ohm for one press per row, (n, n_tones); errors as :meth:`Sensor.impedance`."""
+    return np.log(sensor.impedance(frequency_hz, force_n[:, None], position_m[:, None]))
 
-    Attributes
-    ----------
-    sensor : Sensor
-        The sensor.
-    frequency_hz : (n_tones,) array
-        Frequencies [Hz].
-    susceptance, loose : (n_tones,) array
-        Per length, unpressed: omega C', and the whole admittance of the film [S/m].
-    track, track_per_pascal : float
-        Resistance of both electrodes per length, and how it rises under the tip [ohm/m], [ohm/m/Pa].
 
-    Examples
-    --------
-    >>> from sensorgen.models.compression import unconfined
-    >>> sensor = Sensor(0.1, 0.01, (3e-4, 3e-4), (5.0, 5.0), 7.6e-10, unconfined(6e5))
-    >>> Forward(sensor, [1e3, 1e5]).log_impedance(np.array([3.0]), np.array([0.05])).shape
-    (1, 2)
+def bearable_n(sensor: Sensor, most_n: float = FORCE_LIMIT_N) -> float:
+    """The largest force up to ``most_n`` that a sensor bears anywhere, the tip half over its end [N].
+
+    Raises
+    ------
+    OutOfRange
+        A tip whose pressure is not uniform; a force that is not above 0.
     """
+    if sensor.profile != UNIFORM:
+        raise OutOfRange(f"a tip of profile {sensor.profile!r}: only uniform pressure can be inverted")
+    if not 0 < most_n < np.inf:
+        raise OutOfRange(f"a force limit of {most_n:g} N; expected a number above 0")
+    ends = np.array([0.0, sensor.length_m])
 
-    def __init__(self, sensor: Sensor, frequency_hz: ArrayLike) -> None:
-        if sensor.profile != UNIFORM:
-            raise OutOfRange(f"a tip of profile {sensor.profile!r}: only uniform pressure can be inverted")
-        self.sensor, self.frequency_hz = sensor, tones(frequency_hz)
-        self.susceptance: Real = 2 * np.pi * self.frequency_hz * sensor.capacitance_f_per_m
-        self.loose = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * self.susceptance
-        track, self.track_per_pascal = sensor.track_ohm_per_m()
-        self.track: Real = np.asarray(track)
-        self._load = far_load(sensor.far_end)
+    def bears(force_n: float) -> bool:
+        return refusal(OutOfRange, sensor.check_press, force_n, ends) is None
 
-    def log_impedance(self, force_n: Real, position_m: Real) -> Complex:
-        """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.impedance`.
-
-        As :meth:`Sensor.impedance`, with everything that does not depend on the press computed once.
-        """
-        sensor, force = self.sensor, force_n[:, None]
-        patch = sensor.patch(position_m[:, None])
-        stress = force / (sensor.width_m * patch.length_m)
-        thinning, _ = sensor.compression.capacitive_strain(stress)
-        pressed = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * (self.susceptance / (1 - thinning))
-        under = self.track + stress * self.track_per_pascal
-        right = np.maximum(sensor.length_m - patch.left_m - patch.length_m, 0.0)
-        z = line.through(
-            [self.track, under, self.track], [self.loose, pressed, self.loose], [patch.left_m, patch.length_m, right],
-            self._load,
-        )  # fmt: skip
-        return np.log(sensor.at_leads(z, self.frequency_hz))
-
-    def force_limit_n(self, most_n: float = FORCE_LIMIT_N) -> float:
-        """The largest force up to ``most_n`` that the sensor bears anywhere, the tip half over its end [N]."""
-        if not 0 < most_n < np.inf:
-            raise OutOfRange(f"a force limit of {most_n:g} N; expected a number above 0")
-        low, high = 0.0, most_n
-        if self._bears(high):
-            return high
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            low, high = (middle, high) if self._bears(middle) else (low, middle)
-        return low * (1 - 1e-6)
-
-    def _bears(self, force_n: float) -> bool:
-        ends = np.full(2, force_n), np.array([0.0, self.sensor.length_m])
-        return refusal(OutOfRange, self.log_impedance, *ends) is None
+    low, high = 0.0, most_n
+    if bears(high):
+        return high
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if bears(middle) else (low, middle)
+    return low * (1 - 1e-6)
 
 
 def tones(frequency_hz: ArrayLike) -> Real:
@@ -117,13 +80,10 @@ _DEGREE = 4
 _ORDERS = np.arange(_DEGREE)
 _TO_POWERS = np.linalg.inv((np.arange(_DEGREE) / (_DEGREE - 1))[:, None] ** _ORDERS)
 
-_SLOPES = np.array([[2.0], [3.0]])  # of the square and the cube
 _FIRST_ORDER = [2, 1]  # by force, by position; the others are the value and the mixed derivative
 _TINY = np.float32(1e-30)
 _SMALL_PRODUCT = 1 << 18  # multiplications up to which BLAS keeps to one thread: more only wait for each other here
 _LOT = 32  # cells compared with all others at once: their distances stay in a core's cache
-
-Float32 = NDArray[np.float32]
 
 
 class Local(NamedTuple):
@@ -140,44 +100,40 @@ class ResponseTable:
 
     Parameters
     ----------
-    forward : Forward
+    sensor : Sensor
         The exact model.
-    force_limit_n : float
+    frequency_hz : (n_tones,) array
+        Frequencies [Hz].
+    most_n : float
         Force that the square's edge stands for [N].
     """
 
-    def __init__(self, forward: Forward, force_limit_n: float) -> None:
-        self.scale = np.array([force_limit_n, forward.sensor.length_m])
-        self.edges = _edges(forward)
+    def __init__(self, sensor: Sensor, frequency_hz: Real, most_n: float) -> None:
+        self.scale = np.array([most_n, sensor.length_m])
+        self.edges = _edges(sensor)
         force, position = (_thirds(edges) * scale for edges, scale in zip(self.edges, self.scale, strict=True))
-        values = parts(forward.log_impedance(*_pairs(force, position).T))
+        values = parts(log_impedance(sensor, frequency_hz, *_pairs(force, position).T))
         self.coefficients = _cubics(values.reshape(len(force), len(position), -1))
-        self._borders = [edges[1:-1] for edges in self.edges]
-        self._per_width = [1 / np.diff(edges) for edges in self.edges]
         self.shape = len(self.edges[0]) - 1, len(self.edges[1]) - 1
         forces, positions = ((edges[1:] + edges[:-1]) / 2 for edges in self.edges)
         self.middles = _pairs(forces, positions)
-        seeds = _pairs(self.edges[0][1::2], positions)
-        local, reach = self.at(seeds), np.repeat(np.diff(self.edges[0][::2]), len(positions))
-        self._filters = _Filters.around(seeds, local.value, local.slope[:, 0], reach)
+        self._seeds = _pairs(self.edges[0][1::2], positions)
+        local, reach = self.at(self._seeds), np.repeat(np.diff(self.edges[0][::2]), len(positions))
+        self._origin = local.value.mean(0)
+        off, along = (local.value - self._origin).T, local.slope[:, 0].T
+        least = np.maximum(-reach, -self._seeds[:, 0])  # no force below 0, or it would explain presses elsewhere
+        filters = (2 * off, along, off * off, off * along, along * along, least, reach)
+        self._filters = [np.ascontiguousarray(of, np.float32) for of in filters]
 
     def at(self, press: Real) -> Local:
         """Interpolated response at scaled presses (n, 2)."""
-        n, axes = len(press), range(2)
-        cell = np.zeros(n, np.intp)
-        powers = np.empty((2, n, 2, _DEGREE))  # of the place within the cell, and their derivatives
-        for axis in axes:
-            k = np.searchsorted(self._borders[axis], press[:, axis], side="right")
-            cell *= self.shape[axis]
-            cell += k
-            per_width = self._per_width[axis][k]
-            t = (press[:, axis] - self.edges[axis][k]) * per_width
-            value, slope = powers[axis].transpose(1, 2, 0)
-            value[0], value[1], value[2] = 1.0, t, t * t
-            value[3] = value[2] * t
-            slope[0], slope[1] = 0.0, per_width
-            slope[2:] = value[1:3] * _SLOPES * per_width
-        rows = self.coefficients[cell]
+        n, powers, (force, position) = len(press), [], self._cells(press)
+        for edges, k, at in zip(self.edges, (force, position), press.T, strict=True):
+            width = edges[k + 1] - edges[k]
+            t, one = (at - edges[k]) / width, np.ones(n)
+            slope = np.stack([0 * one, one, 2 * t, 3 * t * t]) / width
+            powers.append(np.stack([[one, t, t * t, t * t * t], slope]).transpose(2, 0, 1))  # of the place in the cell
+        rows = self.coefficients[force * self.shape[1] + position]
         along = (powers[0] @ rows).reshape(n, 2, _DEGREE, rows.shape[2] // _DEGREE)
         both = powers[1][:, None] @ along
         return Local(both[:, 0, 0], both.reshape(n, 4, -1)[:, _FIRST_ORDER] if n else both[:, 0])
@@ -190,24 +146,32 @@ class ResponseTable:
         response, weight : (n, 2 n_tones) array
             Measured ln Z, anything finite where it is missing; 1/sigma, 0 where it is missing.
         """
-        filters = self._filters
-        size = max(1, _SMALL_PRODUCT // filters.response.size)
-        seeds = [
-            filters.nearest(response[start : start + size], weight[start : start + size])
-            for start in range(0, max(len(response), 1), size)
-        ]
-        seed, shift = (np.concatenate(column) for column in zip(*seeds, strict=True))
-        press = filters.seeds[seed]
-        least = self.edges[0][1] / 2  # at no force nothing depends on the position: a search that starts there stays
-        press[:, 0] = np.minimum(np.maximum(press[:, 0] + shift, least), 1.0)
-        return press  # type: ignore[no-any-return]
+        match, along, squares, products, curvatures, least, most = self._filters
+        square = (weight * weight).astype(np.float32)
+        wanted = square * (response - self._origin).astype(np.float32)
+        press, size = np.empty((len(response), 2)), max(1, _SMALL_PRODUCT // match.size)
+        for rows in (slice(start, start + size) for start in range(0, len(response), size)):
+            weights = square[rows][:1] if (square[rows] == square[rows][:1]).all() else square[rows]
+            slope, curvature = wanted[rows] @ along - weights @ products, weights @ curvatures + _TINY
+            shift = np.minimum(np.maximum(slope / curvature, least), most)
+            gain = wanted[rows] @ match - weights @ squares + shift * (2 * slope - curvature * shift)
+            seed = gain.argmax(1)
+            press[rows] = self._seeds[seed]
+            press[rows, 0] += shift[np.arange(len(seed)), seed]
+        lowest = self.edges[0][1] / 2  # at no force nothing depends on the position: a search that starts there stays
+        press[:, 0] = np.clip(press[:, 0], lowest, 1.0)
+        return press
+
+    def _cells(self, press: Real) -> list[Index]:
+        """Numbers of the cells that presses (n, 2) are in, along either axis."""
+        return [np.searchsorted(edges[1:-1], at, side="right") for edges, at in zip(self.edges, press.T, strict=True)]
 
     def cell(self, press: Real) -> Index:
         """Number of the cell that a press (n, 2) is in."""
-        force, position = (np.searchsorted(self._borders[axis], press[:, axis], side="right") for axis in (0, 1))
+        force, position = self._cells(press)
         return np.asarray(force * self.shape[1] + position)
 
-    def rivals(self, sigma: Real) -> tuple[Index, Real]:
+    def rivals(self, sigma: float) -> tuple[Index, Real]:
         """For every cell, the cell of the nearest other minimum of the distance, or -1; and a lower limit of it.
 
         The distance, in units of noise, is the one that is left for a press anywhere in the two cells.
@@ -233,52 +197,9 @@ class ResponseTable:
         return rival, gap - (spacing + spacing[rival]) / 2
 
 
-class _Filters(NamedTuple):
-    """Seeds as a matched filter takes them, in single precision: (2 n_tones, k) each, and what is summed of them."""
-
-    seeds: Real
-    origin: Real
-    response: Float32
-    by_force: Float32
-    squares: Float32
-    products: Float32
-    curvatures: Float32
-    least: Float32
-    most: Float32
-
-    @classmethod
-    def around(cls, seeds: Real, response: Real, by_force: Real, reach: Real) -> "_Filters":
-        """From presses (k, 2), their responses (k, 2 n_tones), derivatives by force, and how far these reach."""
-        origin = response.mean(0)
-        off, along = (response - origin).T, by_force.T
-        least = np.maximum(-reach, -seeds[:, 0])  # no force below 0, or it would explain what presses elsewhere do
-        arrays = (2 * off, along, off * off, off * along, along * along, least, reach)
-        return cls(seeds, origin, *(np.ascontiguousarray(a, np.float32) for a in arrays))
-
-    def nearest(self, response: Real, weight: Real) -> tuple[Index, Real]:
-        """Seed and shift in force of the smallest weighted distance to each response."""
-        square = (weight * weight).astype(np.float32)
-        square = square[:1] if (square == square[:1]).all() else square
-        wanted = square * (response - self.origin).astype(np.float32)
-        along = wanted @ self.by_force
-        along -= square @ self.products
-        curvature = square @ self.curvatures
-        curvature += _TINY
-        shift = along / curvature
-        np.minimum(shift, self.most, out=shift)
-        np.maximum(shift, self.least, out=shift)
-        along *= 2
-        along -= curvature * shift
-        along *= shift
-        along += wanted @ self.response
-        along -= square @ self.squares
-        seed = along.argmax(1)
-        return seed, shift[np.arange(len(seed)), seed].astype(float)
-
-
-def _edges(forward: Forward) -> tuple[Real, Real]:
+def _edges(sensor: Sensor) -> tuple[Real, Real]:
     """Borders of the cells in the unit square; the ends, where the tip overhangs, have cells of their own."""
-    half = min(forward.sensor.tip_m / forward.sensor.length_m / 2, 0.5)
+    half = min(sensor.tip_m / sensor.length_m / 2, 0.5)
     parts = [
         np.linspace(0, half, END_CELLS + 1),
         np.linspace(half, 1 - half, POSITION_CELLS + 1),

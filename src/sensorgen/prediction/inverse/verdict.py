@@ -1,8 +1,9 @@
 """Statuses of estimates: one word per sample, the worst that applies, their counts, and rows of a CSV file."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from enum import IntEnum
+from statistics import median
 from typing import Any, Self
 
 import numpy as np
@@ -34,15 +35,31 @@ class Worded(IntEnum):
         return statuses
 
 
-class Counts:
-    """Counts of statuses, block by block."""
+class Tally:
+    """Counts of statuses, and medians of numbers; of the numbers, each block's median is kept.
 
-    def __init__(self, kind: type[Worded]) -> None:
-        self._kind, self._counts = kind, Counter[int]()
+    Parameters
+    ----------
+    kind : type
+        Of the statuses.
+    columns : sequence of str
+        Of the rows.
+    """
 
-    def add(self, statuses: NDArray[np.uint8]) -> None:
+    def __init__(self, kind: type[Worded], columns: Sequence[str]) -> None:
+        self._kind, self._columns, self._counts = kind, columns, Counter[int]()
+        self._medians = defaultdict[str, list[float]](list)
+
+    def header(self, given: Sequence[str]) -> str:
+        """Names of the columns, those of the input before; one that has the name of a result is ``..._given``."""
+        return csv_row([*(f"{name}_given" if name in self._columns else name for name in given), *self._columns])
+
+    def count(self, statuses: NDArray[np.uint8], **numbers: Real) -> None:
         """Count a block."""
         self._counts.update(statuses.tolist())
+        for name, values in numbers.items():
+            if len(values):
+                self._medians[name].append(float(np.median(values)))
 
     @property
     def samples(self) -> int:
@@ -57,14 +74,10 @@ class Counts:
         """True if more than half of the samples have one of these."""
         return sum(self._counts[one] for one in statuses) > self.samples / 2
 
-
-def header(given: Sequence[str], columns: Sequence[str]) -> str:
-    r"""Names of the columns, those of the input before; one that has the name of a result is ``..._given``.
-
-    >>> header(["time_s", "force_n"], ["force_n", "position_mm"])
-    'time_s,force_n_given,force_n,position_mm\n'
-    """
-    return csv_row([*(f"{name}_given" if name in columns else name for name in given), *columns])
+    def median(self, name: str) -> float | None:
+        """Median of a number, None where there is none or it is infinite."""
+        middle = median(self._medians[name] or [np.inf])
+        return middle if middle < np.inf else None
 
 
 def rows(given: Sequence[Sequence[str]], numbers: Real, tones: NDArray[np.intp], words: NDArray[Any]) -> str:

@@ -9,6 +9,7 @@ from functools import cached_property
 from itertools import chain, pairwise, permutations
 from math import hypot
 
+from sensorgen.core.lazy import by_key
 from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Point, Scene, area_mm2, clipped, sides
 from sensorgen.scene.sections import Section, SectionColumn, alike, columns, distinct
 
@@ -260,9 +261,7 @@ def _levels(view: View) -> Iterator[float]:
 
 def _extents(view: View) -> Iterator[Point]:
     """Lowest and highest place of each body [mm]."""
-    by_body: dict[str, list[float]] = {}
-    for body, outline in view.regions:
-        by_body.setdefault(body.name, []).extend(z for _, z in outline)
+    by_body = by_key((body.name, z) for body, outline in view.regions for _, z in outline)
     return ((min(zs), max(zs)) for zs in by_body.values())
 
 

@@ -139,8 +139,8 @@ def _inversions(name: str, budget_s: float) -> list[ChartPoint]:
         return max(*off, DIGITS), f"{press[0]:.6g} N at {1e3 * press[1]:.6g} mm"
 
     def sought() -> Press:
-        inverted = _estimator().one(_READING)
-        return inverted.force_n, inverted.position_m
+        inverted = _estimator().batch(_READING[None])
+        return float(inverted.force_n[0]), float(inverted.position_m[0])
 
     return list(climbed(name, [("invert: seven tones", [("", sought)])], judge, budget_s))
 

@@ -9,6 +9,7 @@ from typing import TypeVar
 from sensorgen.analysis.plots import static
 from sensorgen.analysis.plots.figure import GREY, Axis, Curve, Figure, Panel, look
 from sensorgen.analysis.plots.pages import PageSection, page
+from sensorgen.core.lazy import by_key
 from sensorgen.verification.chart import kind_of
 from sensorgen.verification.chart.measured import ChartPoint
 from sensorgen.verification.design_chart.results import DesignChart, Point
@@ -140,10 +141,7 @@ def _costs(points: Sequence[Point], columns: Iterable[str]) -> list[float]:
 
 def _grouped(points: Sequence[AnyPoint], column: str) -> dict[str, list[AnyPoint]]:
     """Points by the text of a column, in the order of their first."""
-    groups: dict[str, list[AnyPoint]] = {}
-    for point in points:
-        groups.setdefault(getattr(point, column), []).append(point)
-    return groups
+    return by_key((getattr(point, column), point) for point in points)
 
 
 def _marks(

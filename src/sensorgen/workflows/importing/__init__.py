@@ -17,6 +17,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Facts, Part, Table, apart
 from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding, listed
+from sensorgen.core.lazy import by_key
 from sensorgen.design import design as designs
 from sensorgen.design import imported, packs
 from sensorgen.prediction.bodies import drawn as drawn_body
@@ -329,9 +330,7 @@ class Imported:
         """Files written, and what applies to them."""
         size = " x ".join(f"{edge:g}" for edge in self.size_mm)
         moved = ", ".join(f"{way:g}" for way in self.moved_mm)
-        reasons: dict[str, list[str]] = {}
-        for name, reason in self.models.items():
-            reasons.setdefault(reason, []).append(name)
+        reasons = by_key((reason, name) for name, reason in self.models.items())
         why = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
         rows = [
             ("size", f"{size} mm" + (f"; moved by {moved} mm, its corner to 0, 0, 0" if any(self.moved_mm) else "")),
