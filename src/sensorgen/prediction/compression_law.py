@@ -37,7 +37,6 @@ CLOSED_FORM = LAWS[:4]
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)), 1.2e5)  # 6 N on a tip of 5 x 10 mm are 120 kPa
 _FURTHER = 1.25  # ratio of stresses beyond those
 _PAST = 1.25  # pressure over the last one of a stored curve up to which it is extended [-]
-_COARSE = (0.0, 0.25, 0.5, 1.0)  # stresses at which tops are compared, over the last one [-]
 _CLOSED = 8  # pressures beyond the last solved one, at which the closed cell bounds a curve
 _PERIODS = 1.5  # height of a block, over the period, above which its pressure is even: exp(-3 pi) [-]
 _HEIGHTS = 2.0  # the same over the cell's height, where no period is known [-]
@@ -544,7 +543,7 @@ def under_tops(
     own : CapacitanceCurve
         Under the tip.
     """
-    loads, level = [own.stress_pa[-1] * share for share in _COARSE], mesh_ladder.coarsest(model)
+    loads, level = [own.stress_pa[-1] * share for share in mesh_ladder.FEW], mesh_ladder.coarsest(model)
 
     def rise(block: str) -> Real:
         try:
@@ -572,7 +571,7 @@ def under_tops(
 def _few_pa(stress_pa: float, tip: Tip) -> Real:
     """A few pressures up to beyond one, where it is among those of :func:`under_tops` these [Pa]."""
     last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
-    usual = stresses_pa(stress_pa)[-1] * np.array(_COARSE)
+    usual = stresses_pa(stress_pa)[-1] * np.array(mesh_ladder.FEW)
     is_usual = stress_pa <= last_pa and not tip.soft and stress_pa in usual
     return usual if is_usual else last_pa * np.array([0.0, 0.4, 0.8, 1.0])
 

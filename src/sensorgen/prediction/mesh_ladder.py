@@ -45,6 +45,9 @@ _OF_DISPLACEMENT = 0.6  # error of the displacement over that of the rise, as ex
 _PIECES_ORDER = 2  # power of the number of pieces with which the mesh's error falls, as another program shows it [-]
 _DOUBT = 0.5  # error of where two meshes lead, over how far that is beyond the finer one; 0.25 was seen [-]
 _APART = 4  # loads of the fine mesh to one of the coarse mesh
+FEW = (0.0, 0.25, 0.5, 1.0)  # loads over the last one, by which a smooth curve is known, and curves are compared [-]
+_BENT = 5e-3  # change of such a curve where its second load is left out, at most: all of them are off by 2e-4 [-]
+_UNLIKE = VERIFIED / 10  # difference of two meshes times that of their curve from a straight line, at most [-]
 _ARRAYS = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
 _TUPLES = ("faults", "doubts", "carried", "apex_m")
 _MEASURED_LOADS = 11  # under which expected times were measured, besides the one of 0
@@ -288,11 +291,65 @@ def estimated(
     MissingValue, BadInput, OutOfRange
         As :func:`pressed`.
     """
-    fine = pressed(case, stress_pa, level, keep=keep, step=step)
-    fine = fine.sound() if sound else fine
-    coarse = _coarser(case, fine, stress_pa, level, keep=keep)
+    if smooth := _smooth(case, stress_pa, level, keep=keep, step=step):
+        fine, coarse = smooth
+    else:
+        fine = pressed(case, stress_pa, level, keep=keep, step=step)
+        fine = fine.sound() if sound else fine
+        coarse = _coarser(case, fine, stress_pa, level, keep=keep)
     coarse = coarse.some(np.flatnonzero(np.isin(coarse.stress_pa, fine.stress_pa)).tolist())
     return (_limit if case.model == "press3d" else _errors)(case, fine, coarse, level)
+
+
+def _smooth(
+    case: Case, stress_pa: Sequence[float], level: int, *, keep: bool, step: Callable[[float], None] | None
+) -> "tuple[Pressed, Pressed] | None":
+    """Solution at the last pressure alone, continued to the others by the curve of the next coarser mesh, the second.
+
+    None where faces touch, or the curve bends too much for that.
+    """
+    few, last_pa = [share * stress_pa[-1] for share in FEW], stress_pa[-1]
+    if len(stress_pa) <= len(few) or _size(case.model, level - 1) == inf or _touches(case):
+        return None
+    coarse = pressed(case, few, level - 1, keep=keep)
+    if coarse.faults or coarse.penetration.any():
+        return None
+    curves = np.column_stack([coarse.displacement_m, _rise(coarse)[0]])[1:]
+    secants = curves / curves[-1] / np.array(FEW[1:])[:, None]
+    if np.abs((2 * secants[0] + secants[2]) / (3 * secants[1]) - 1).max() > _BENT:
+        return None
+    fine = pressed(case, [0.0, last_pa], level, keep=keep, step=step)
+    ratio = [fine.displacement_m[-1], _rise(fine)[0][-1]] / curves[-1]
+    unlike = np.abs(ratio - 1) * np.abs(secants - 1).max(axis=0)
+    if fine.faults or fine.penetration.any() or unlike.max() > _UNLIKE:
+        return None
+    at = np.divide(stress_pa, last_pa)
+    shares = at[:, None] * (np.vander(at, 3) @ np.polyfit(FEW[1:], secants, 2))
+    return _between(fine, np.asarray(stress_pa), *shares.T), coarse
+
+
+def _touches(case: Case) -> bool:
+    """Test whether solids touch in a point as drawn, or may; gaps close from there on."""
+    from sensorgen.models import press2d
+    from sensorgen.solvers.contact.mesh import pinches
+
+    scene, period_mm = case.piece.scene, case.piece.period_mm
+    return case.model == "press_round" or (case.model == "press2d" and bool(pinches(press2d.cell(scene, period_mm))))
+
+
+def _between(solution: "Pressed", stress_pa: Real, moved: Real, risen: Real) -> "Pressed":
+    """Solution at rest and at one pressure continued to those between, by shares of displacement and of rise (n,)."""
+    first, last = _ends(solution)
+    return replace(
+        solution,
+        stress_pa=stress_pa,
+        displacement_m=moved * solution.displacement_m[-1],
+        capacitance_f_per_m2=tuple(Interval(*pair) for pair in (first + risen[:, None] * (last - first)).tolist()),
+        carried=(solution.carried[:1] + solution.carried[1:] * (len(stress_pa) - 1)),
+        volume_ratio=1 + moved * (solution.volume_ratio[-1] - 1),
+        penetration=np.zeros_like(stress_pa),
+        imbalance=moved * solution.imbalance[-1],
+    )
 
 
 def _coarser(case: Case, fine: "Pressed", stress_pa: Sequence[float], level: int, *, keep: bool) -> "Pressed":

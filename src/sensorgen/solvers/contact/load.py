@@ -159,9 +159,11 @@ class Problem:
         size, n = here.shape[1], self.free.shape[1]
         rows, columns = np.repeat(here, size, axis=1).ravel(), np.tile(here, (1, size)).ravel()
         inside = np.flatnonzero((rows >= 0) & (columns >= 0))
-        entries, place = np.unique(rows[inside] * n + columns[inside], return_inverse=True)
-        starts = np.searchsorted(entries, n * np.arange(n + 1))
-        return csr_matrix((np.zeros(len(entries)), entries % n, starts), (n, n)), inside, place
+        at = rows[inside], columns[inside]
+        empty = coo_matrix((np.zeros(len(inside)), at), (n, n)).tocsr()
+        # Sooner than sorting all entries: each is looked up by its number from 1 on
+        numbered = csr_matrix((np.arange(1, empty.nnz + 1), empty.indices, empty.indptr), empty.shape)
+        return empty, inside, np.asarray(numbered[at]).ravel() - 1
 
     def _springs(self, pairs: FacePairs, u: Real) -> Iterator[tuple[csr_matrix, Mask, Real]]:
         """Rows of what the contact acts on, gaps and slips, on which of them it does, and how far each is moved [m]."""
