@@ -25,6 +25,8 @@ _MOST_CUTS, _MORE_CUTS = 4, 4  # failed load steps in all before partners may st
 _FLAT = 1e-3  # gaps that differ by less than this share of their side close at once [-]
 _DEEPEST = 0.1  # initial penetration of a part that is lowered, over the length of a side [-]
 _ROUNDING = 1e-9
+_APART = 0.5  # gap over a face's side, above which faces are far from touching [-]
+_LONGER = 2.5  # longest load step while no faces touch, over that in contact [-]
 
 
 @dataclass(frozen=True)
@@ -258,10 +260,22 @@ class Problem:
                 return replace(state, u_m=u, inner=inner)
         return None
 
+    def touches(self, state: State, share: float = 0.0) -> bool:
+        """Test whether faces touch, or are nearer than a share of their sides."""
+        return bool((self.gaps(state.pairs, state.u_m) < share * state.pairs.length_m).any())
+
+    def longest(self, state: State) -> float:
+        """Longest step from a state over that in contact [-]."""
+        return 1.0 if self.touches(state) else _LONGER
+
+    def is_closed(self) -> bool:
+        """Test whether faces touch from the first load on, or soon after."""
+        return bool(self.loose.any()) or self.touches(self.start(), _APART)
+
     def extrapolated(self, state: State, before: State, pressure_pa: float) -> State:
         """Start of Newton's method by the last load step's direction; the state itself where there is contact."""
         gone = state.pressure_pa - before.pressure_pa
-        if not (before.pressure_pa and gone) or (self.gaps(state.pairs, state.u_m) < 0).any():
+        if not (before.pressure_pa and gone) or self.touches(state):
             return state
         share = (pressure_pa - state.pressure_pa) / gone
         u = state.u_m + share * (state.u_m - before.u_m)
@@ -318,20 +332,24 @@ class Problem:
 
 
 def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) -> Iterator[State]:
-    """Equilibria at increasing pressures, and at each step of at most ``longest_pa`` between; ends where steps fail."""
+    """Equilibria at increasing pressures, and at each step between; ends where steps fail.
+
+    Steps are of at most ``longest_pa``, or more while no faces touch.
+    """
     state = problem.start()
     yield state
     state = before = problem.lowered(state, min(pressures_pa[1], longest_pa))
-    step, cuts = longest_pa, 0
+    step, cuts = problem.longest(state) * longest_pa, 0
     for target in pressures_pa[1:]:
         while state.pressure_pa < target:
             left = target - state.pressure_pa
             aim = target if left < step * (1 + _ROUNDING) else state.pressure_pa + step
             reached = problem.stepped(state, aim, before, keeps=cuts >= _MOST_CUTS)
-            if reached is not None:
-                before, state, step = state, reached, min(2 * step, longest_pa)
+            is_long = aim - state.pressure_pa > longest_pa * (1 + _ROUNDING)
+            if reached and not (is_long and problem.touches(reached)):
+                before, state, step = state, reached, min(2 * step, problem.longest(reached) * longest_pa)
                 yield state
                 continue
-            cuts, step = cuts + 1, min(step, left) / 2
+            cuts, step = cuts + (not is_long), longest_pa if is_long else min(step, left) / 2
             if cuts > _MOST_CUTS + _MORE_CUTS:
                 return
