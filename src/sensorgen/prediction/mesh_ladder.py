@@ -47,7 +47,6 @@ _DOUBT = 0.5  # error of where two meshes lead, over how far that is beyond the 
 _APART = 4  # loads of the fine mesh to one of the coarse mesh
 FEW = (0.0, 0.25, 0.5, 1.0)  # loads over the last one, by which a smooth curve is known, and curves are compared [-]
 _BENT = 5e-3  # change of such a curve where its second load is left out, at most: all of them are off by 2e-4 [-]
-_UNLIKE = VERIFIED / 10  # difference of two meshes times that of their curve from a straight line, at most [-]
 _ARRAYS = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
 _TUPLES = ("faults", "doubts", "carried", "apex_m")
 _MEASURED_LOADS = 11  # under which expected times were measured, besides the one of 0
@@ -308,33 +307,31 @@ def _smooth(
 
     None where faces touch, or the curve bends too much for that.
     """
-    few, last_pa = [share * stress_pa[-1] for share in FEW], stress_pa[-1]
-    if len(stress_pa) <= len(few) or _size(case.model, level - 1) == inf or _touches(case):
+    few = [share * stress_pa[-1] for share in FEW]
+    if len(stress_pa) <= len(few) or not _may_be_smooth(case, level):
         return None
     coarse = pressed(case, few, level - 1, keep=keep)
     if coarse.faults or coarse.penetration.any():
         return None
-    curves = np.column_stack([coarse.displacement_m, _rise(coarse)[0]])[1:]
-    secants = curves / curves[-1] / np.array(FEW[1:])[:, None]
+    secants = np.column_stack([coarse.displacement_m, _rise(coarse)[0]])[1:] / np.array(few[1:])[:, None]
     if np.abs((2 * secants[0] + secants[2]) / (3 * secants[1]) - 1).max() > _BENT:
         return None
-    fine = pressed(case, [0.0, last_pa], level, keep=keep, step=step)
-    ratio = [fine.displacement_m[-1], _rise(fine)[0][-1]] / curves[-1]
-    unlike = np.abs(ratio - 1) * np.abs(secants - 1).max(axis=0)
-    if fine.faults or fine.penetration.any() or unlike.max() > _UNLIKE:
+    fine = pressed(case, [0.0, stress_pa[-1]], level, keep=keep, step=step)
+    if fine.faults or fine.penetration.any():
         return None
-    at = np.divide(stress_pa, last_pa)
-    shares = at[:, None] * (np.vander(at, 3) @ np.polyfit(FEW[1:], secants, 2))
+    at = np.divide(stress_pa, stress_pa[-1])
+    shares = at[:, None] * (np.vander(at, 3) @ np.polyfit(FEW[1:], secants / secants[-1], 2))
     return _between(fine, np.asarray(stress_pa), *shares.T), coarse
 
 
-def _touches(case: Case) -> bool:
-    """Test whether solids touch in a point as drawn, or may; gaps close from there on."""
+def _may_be_smooth(case: Case, level: int) -> bool:
+    """Test whether there is a coarser mesh, and no point in which solids touch as drawn: gaps close from there on."""
     from sensorgen.models import press2d
     from sensorgen.solvers.contact.mesh import pinches
 
-    scene, period_mm = case.piece.scene, case.piece.period_mm
-    return case.model == "press_round" or (case.model == "press2d" and bool(pinches(press2d.cell(scene, period_mm))))
+    if case.model == "press2d":
+        return not pinches(press2d.cell(case.piece.scene, case.piece.period_mm))
+    return case.model == "press3d" and _size(case.model, level - 1) < inf
 
 
 def _between(solution: "Pressed", stress_pa: Real, moved: Real, risen: Real) -> "Pressed":
