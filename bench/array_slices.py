@@ -16,6 +16,7 @@ from sensorgen.workflows.build import build
 from sensorgen.workflows.slice import slice_design
 from sensorgen.workflows.tiles import tiles
 
+NOTES = "## Notes\n"
 RESULTS = Path(__file__).parent / "results"
 NEWER = Path.home() / ".cache/sensorgen-debian13/bin"
 PROGRAMS = {"prusa": ("prusa", ""), "cura": ("cura", ""), "prusa-newer": ("prusa", NEWER / "prusa-slicer"),
@@ -80,9 +81,9 @@ def main() -> None:
     head += "|---|---|---|---|---|---|\n"
     kinds = ", ".join(f"mat-{k} {kind}" for k, kind in KINDS.items())
     note = f"Foot 42 and 60 x 60 mm at 5 mm pitch, foot 42 at 10 mm, tiles of a mat of 488 x 447 mm ({kinds})."
-    (RESULTS / "array_slices.md").write_text(
-        f"# Arrays and slicers\n\n{head}" + "\n".join(rows) + f"\n\n{note}\n", "utf-8"
-    )
+    page = RESULTS / "array_slices.md"
+    notes = page.read_text("utf-8").partition(NOTES)[2] if page.exists() else ""  # by hand: they stay
+    page.write_text(f"# Arrays and slicers\n\n{head}" + "\n".join(rows) + f"\n\n{note}\n\n{NOTES}{notes}", "utf-8")
 
 
 if __name__ == "__main__":

@@ -83,6 +83,21 @@ def test_force_centre_and_area_are_those_of_the_map(model):
     assert row[6] == pytest.approx(300.0, rel=1e-3)
 
 
+def test_a_crossing_that_flickers_is_named_and_not_determined(model):
+    """A row's multiplexer shows another crossing in every tenth frame; steps without it are as they are."""
+    readout = ArrayReadout(frequency_hz=(1e3,), noise=1e-4)
+    of_steps = np.tile(PRESSURE[:1], (100, 1, 1)) * np.sin(np.linspace(0, 6, 100))[:, None, None] ** 2
+    frames = frames_of(model, readout, pressures_pa=of_steps)
+    sound = maps(model, readout, frames)
+    assert "flicker" not in sound.by
+    frames[3::10, 2, 1] = 1.5 * frames[0, 2, 1]
+    found = maps(model, readout, frames)
+    assert found.by.endswith("left out, as they flicker: r3c2")
+    lost = np.isnan(found.pressure_kpa).all(0)
+    assert np.argwhere(lost).tolist() == [[2, 1]]
+    assert np.array_equal(found.pressure_kpa[:, ~lost], sound.pressure_kpa[:, ~lost])
+
+
 def test_capacitances_alone_do(model):
     readout = ArrayReadout(frequency_hz=(10e3,), noise=1e-4)
     frames = frames_of(model, readout)

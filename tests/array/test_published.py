@@ -32,13 +32,6 @@ def test_a_reference_without_a_clock_is_laid_on_the_counts(tmp_path):
     assert held[:, :5].min() > 200
 
 
-def test_elements_that_jump_flicker():
-    counts = np.full((1000, 3), 230.0)
-    counts[::30, 1] = 237
-    counts[500:, 2] = 220
-    assert published.flickering(counts).tolist() == [False, True, False]
-
-
 def test_another_file_is_refused(tmp_path):
     for name in (published.MODEL, *published.RECORDINGS.values()):
         (tmp_path / name).parent.mkdir(exist_ok=True)

@@ -11,8 +11,16 @@ from sensorgen.core import document
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.array_frames import refuse_swapped, session
 from sensorgen.prediction.array import sessions as calibration
-from sensorgen.prediction.array.elements import ArraySession, LawForm, Past, behind, doubtful_time, lagged
-from sensorgen.prediction.array.sessions import calibrated, law_of, stored, study
+from sensorgen.prediction.array.elements import (
+    ArraySession,
+    LawForm,
+    Past,
+    behind,
+    doubtful_time,
+    flickering,
+    lagged,
+)
+from sensorgen.prediction.array.sessions import calibrated, law_of, median_error, stored, study
 
 PRINT = Insole(elements=20, bad=6, minutes=4.0, rate_hz=1.0)
 
@@ -247,6 +255,71 @@ def test_time_that_looks_like_milliseconds_is_doubtful(days):
     assert any("a frame every 1000 s; expected time_s in seconds" in line for line in doubtful_time(slow.time_s))
     assert not list(doubtful_time(days[0].time_s))
     assert "doubtful: a frame every 1000 s" in "\n".join(document.text(study([slow]).document()))
+
+
+def after_a_load(one, left, tau_s):
+    """Session whose readings have still what an earlier load left, the same in all elements."""
+    return replace(one, reading=one.reading + left * np.exp(-one.time_s / tau_s)[:, None])
+
+
+@pytest.mark.parametrize("tau_s", [60.0, 100.0, 200.0])
+def test_a_rest_that_falls_is_corrected_and_its_doubt_is_in_the_interval(days, tau_s):
+    """A tenth of the span that an earlier load left triples the error if the tare is taken as it is."""
+    known, held = calibrated(days[:3], LawForm(powers=2, tau_s=100.0)), days[3]
+    late = after_a_load(held, 0.1 * np.nanmax(held.reading - held.tare), tau_s)
+    mean, half = known.pressures(late)
+    usual, tared, corrected = (
+        median_error(of, late) for of in (known.pressures(held)[0], known.pressures(late, late.tare)[0], mean)
+    )
+    assert tared > 2.5 * usual
+    assert corrected < (1.25 if tau_s == 100 else 2.0) * usual
+    inside = np.abs(mean - late.pressure_kpa) < half
+    assert inside[np.isfinite(mean)].mean() > 0.85
+    assert any("readings at rest fall by" in line for line in document.text(study([days[0], late]).document()))
+
+
+def test_a_rest_that_rises_or_stays_or_ends_the_recording_is_no_fall(days):
+    one = days[0]
+    assert one.falls == (0.0, 0.0)
+    assert after_a_load(one, -5.0, 100.0).falls == (0.0, 0.0)
+    assert replace(after_a_load(one, 5.0, 100.0), rest=one.time_s > one.time_s[-1] - 15).falls == (0.0, 0.0)
+
+
+def walked(rng, rate_hz=100):
+    """A minute of steps of 0.6 s on 12 elements, some of which carry nothing, with noise of 0.5 counts."""
+    time_s = np.arange(0, 60, 1 / rate_hz)
+    within = (time_s % 1.0) / 0.6
+    step = np.where(within < 1, np.minimum(np.minimum(within / 0.08, (1 - within) / 0.1), 1.0), 0.0)
+    return time_s, step[:, None] * np.linspace(0, 40, 12) + 0.5 * rng.normal(size=(len(time_s), 12))
+
+
+def test_elements_that_jump_flicker_and_steps_do_not():
+    rng = np.random.default_rng(1)
+    time_s, reading = walked(rng)
+    assert not flickering(time_s, reading).any()
+    for element, lasts in ((3, 1), (7, 3)):  # of another element, for one frame and for three
+        for start in rng.choice(len(time_s) - 5, 100, replace=False):
+            reading[start : start + lasts, element] = reading[start : start + lasts, 11] + 15
+    assert np.flatnonzero(flickering(time_s, reading)).tolist() == [3, 7]
+    assert not flickering(time_s[::10], reading[::10]).any()  # frames too far apart to tell
+    assert not flickering(time_s[:6], reading[:6]).any()
+
+
+def test_elements_that_flicker_are_left_out_of_their_session():
+    """The calibration is that of the session without them."""
+    time_s = np.arange(0, 8, 0.02)
+    kpa, none = 200 * np.maximum(np.sin(time_s) ** 2 - 0.2, 0.0), np.full(len(time_s), np.nan)
+    known = np.tile(kpa[:, None], 5)
+    days = [
+        ArraySession(f"{day}", day, time_s, straight(GAINS, known, noise=0.5, seed=day), kpa == 0, known, none)
+        for day in (0, 1)
+    ]
+    loose = days[0].reading.copy()
+    loose[::20, 2] += 60.0
+    found = study([replace(days[0], reading=loose), days[1]])
+    without = study([replace(days[0], reading=np.where(np.arange(5) == 2, np.nan, loose)), days[1]])
+    assert found.calibration.law.at == pytest.approx(without.calibration.law.at)
+    assert "doubtful: 1 elements, from 1: 3 flicker" in "\n".join(document.text(found.document()))
 
 
 def test_tare_is_of_marked_or_nothing_and_a_standing_load_is_none(days):

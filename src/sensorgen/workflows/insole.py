@@ -14,6 +14,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Part, Table
 
 if TYPE_CHECKING:
+    from sensorgen.design.design import Design
     from sensorgen.measure.virtual.array import VirtualArray, WalkedStep
     from sensorgen.prediction.array.frames import PressureMaps
     from sensorgen.prediction.array.model import ArrayModel
@@ -145,12 +146,50 @@ def _noise_after(change: _Change) -> float:
     return float(np.median(resolution.sigma_kpa[resolution.determined]))
 
 
+def designed(k: int) -> dict[str, Any]:
+    """Design file of the first insole, 0, or of that with air between its columns, 1."""
+    return _with(_CHANGES[0]) if k else dict(_DESIGN)
+
+
 def _run(
     folder: Path, name: str, data: Mapping[str, Any], seed: int, step: Callable[[str], None]
 ) -> "tuple[InsoleRun, PressureMaps, WalkedStep]":  # fmt: skip
     """One design through the whole chain."""
     from sensorgen.checks.review import review
     from sensorgen.design.design import load
+
+    path = folder / f"{name}.yaml"
+    store.replace(path, yaml.safe_dump(dict(data), sort_keys=False).encode())
+    design = load(path)
+    step(f"{name}: check")
+    verdict = review(design).verdict
+    step(f"{name}: print, calibration, step")
+    return walk(folder, design, name, seed, verdict)
+
+
+def walk(
+    folder: Path, design: "Design", name: str, seed: int, verdict: str = ""
+) -> "tuple[InsoleRun, PressureMaps, WalkedStep]":  # fmt: skip
+    """Print a design virtually, calibrate it, and walk a step on it.
+
+    Parameters
+    ----------
+    folder : Path
+        Recordings, calibration and maps are written there.
+    design : Design
+        An array.
+    name : str
+        Of the files.
+    seed : int
+        Of print, faults, presses and noise.
+    verdict : str
+        Of the design's check, for the result.
+
+    Returns
+    -------
+    InsoleRun, PressureMaps, WalkedStep
+        Figures, maps by the calibration, and the true load.
+    """
     from sensorgen.measure.array_frames import of_frames, read
     from sensorgen.measure.virtual.array import printed, walked
     from sensorgen.prediction.array.frames import inverted
@@ -158,16 +197,10 @@ def _run(
     from sensorgen.prediction.array.readout import ArrayReadout
     from sensorgen.prediction.array.sessions import calibrated
 
-    path = folder / f"{name}.yaml"
-    store.replace(path, yaml.safe_dump(dict(data), sort_keys=False).encode())
-    design = load(path)
-    step(f"{name}: check")
-    verdict = review(design).verdict
     model, readout = array_model(design), ArrayReadout()
-    step(f"{name}: print, calibration, step")
     draw = np.random.default_rng(seed)
     print_ = printed(
-        model, seed, _SCATTER, _faults(model, draw), stiffness=float(np.exp(0.25 * draw.normal())), own_law=True,
+        model, seed, _SCATTER, faults(model, draw), stiffness=float(np.exp(0.25 * draw.normal())), own_law=True,
         play=_PLAY, creep=_CREEP, drift=_DRIFT,
     )  # fmt: skip
     recordings = [folder / f"{name}-{what}.npz" for what in ("bladder", "presses", "bladder-again")]
@@ -187,7 +220,7 @@ def _run(
     return _compared(name, verdict, by_design, found, true), found, true
 
 
-def _faults(model: "ArrayModel", draw: np.random.Generator) -> list[str]:
+def faults(model: "ArrayModel", draw: np.random.Generator) -> list[str]:
     """A row broken near its far end, and a shorted crossing, of another row."""
     rows = draw.permutation([int(track.name[1:]) for track in model.layout.rows])
     broken = next(track for track in model.layout.rows if track.name == f"r{rows[0]}")

@@ -32,6 +32,13 @@ _RESPONDS = 0.5  # share of the variance of a reference that a live element's re
 _N_PER_KPA_MM2 = 1e-3
 _PART = 0.9  # of what an element's readings tell, at most, that is taken for noise
 _LONG_S = 5.0  # from a frame to the next: longer is doubtful
+_RECOVERY_S = 100.0  # of what an earlier load left, where the law has no memory
+_UNSURE = 0.6  # relative error of that: half to double the time
+_FALLS, _RESTS_S, _TELL = 4.0, 5.0, 10  # standard errors, seconds of rest, and elements, that tell of a fall at rest
+_JUMP_S, _NEAR = 0.1, 2  # of a window, shorter than any load of a foot, and its frames on either side at least
+_JUMP, _JUMPS, _FEW = 0.15, 0.01, 4  # of what elements span; share of the frames, and frames, that may jump by it
+_MEDIAN = 1.858  # standard error of a Gaussian sample's median, over its median deviation and root of its size
+_NOISES = 6.0  # standard deviations of noise, that are no jump
 
 
 @dataclass
@@ -143,6 +150,48 @@ class ArraySession:
         return _mean(self.reading[self.unloaded])
 
     @cached_property
+    def flickers(self) -> Mask:
+        """Elements that flicker, (n,)."""
+        return flickering(self.time_s, self.reading)
+
+    def steady(self) -> "ArraySession":
+        """The session without the readings of elements that flicker; itself where none does."""
+        if not self.flickers.any():
+            return self
+        return replace(self, reading=np.where(self.flickers, np.nan, self.reading))
+
+    @cached_property
+    def falls(self) -> tuple[float, float]:
+        """Rate at which all readings fall at rest towards those without load, and its standard error [1/s]; 0 of none.
+
+        A rest that begins the recording, and whose readings fall together, follows an earlier load.
+        """
+        time_s = self.time_s[self.unloaded]
+        if time_s[0] > self.time_s[0] + _RESTS_S or np.ptp(time_s) < _RESTS_S:
+            return 0.0, 0.0
+        away = time_s - time_s.mean()
+        slopes = away @ (self.reading[self.unloaded] - self.tare) / (away @ away)
+        slopes = slopes[np.isfinite(slopes)]
+        if slopes.size < _TELL:
+            return 0.0, 0.0
+        rate = float(np.median(slopes))
+        error = float(np.median(np.abs(slopes - rate)) * _MEDIAN / np.sqrt(slopes.size))
+        loaded = float(np.nanmedian(_mean(self.reading - self.tare)))
+        return (rate, error) if abs(rate) > _FALLS * error and rate * loaded < 0 else (0.0, 0.0)
+
+    def recovery(self, tau_s: float) -> tuple[Real, Real]:
+        """Reading above the tare that an earlier load left, and its error, (k, 1): as it decays, and is below after.
+
+        It decays as the law's memory does, in 100 s without one. A rest of seconds leaves that time open: half or double
+        of it is in the error.
+        """
+        rate, error = self.falls
+        tau_s = tau_s or _RECOVERY_S
+        decay = np.exp(-(self.time_s - self.time_s[0]) / tau_s)[:, None]
+        above = tau_s * (1 - decay / decay[self.unloaded].mean())
+        return rate * above, np.hypot(error, _UNSURE * rate) * above
+
+    @cached_property
     def noise(self) -> Real:
         """Standard deviation of white noise, by differences of successive unloaded readings, (n,); 0 of one alone."""
         return np.asarray(np.sqrt(np.nan_to_num(_mean(np.diff(self.reading[self.unloaded], axis=0) ** 2)) / 2))
@@ -173,6 +222,34 @@ def _mean(values: Real) -> Real:
     finite = np.isfinite(values)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(np.where(finite, values, 0.0).sum(0) / finite.sum(0))
+
+
+def flickering(time_s: Real, reading: Real) -> Mask:
+    """Elements that in more than a hundredth of the frames jump and come back within a tenth of a second, (n,).
+
+    No load of a foot is that short: a loose wire is, or a multiplexer that shows another element. Frames that are
+    farther apart show neither.
+
+    Parameters
+    ----------
+    time_s : (k,) array
+        Of each frame [s].
+    reading : (k, n) array
+        Of each element, in any unit.
+    """
+    from scipy.ndimage import median_filter
+
+    step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else np.nan
+    near = int(_JUMP_S / step / 2 + 0.1) if step > 0 else 0
+    if near < _NEAR or len(time_s) < 2 * near + 1:
+        return np.zeros(reading.shape[1], bool)
+    x = np.nan_to_num(reading)
+    around = median_filter(x, (2 * near + 1, 1))
+    low, high = np.quantile(around[:: max(1, len(x) // 2000)], (0.02, 0.98), axis=0)
+    span = np.quantile(high - low, 0.75)  # of one that is loaded
+    noise = np.median(np.abs(np.diff(x, axis=0)), 0)
+    jumps = (np.abs(x - around) > np.maximum(_JUMP * span, _NOISES * noise)).sum(0)
+    return np.asarray(jumps > max(_JUMPS * len(x), _FEW))
 
 
 def doubtful_time(time_s: Real) -> Iterator[str]:
@@ -290,8 +367,8 @@ def sums_of(session: ArraySession, form: LawForm, scale: float) -> Sums:
     known = np.isfinite(session.pressure_kpa) & np.isfinite(session.reading)
     known &= np.isfinite(session.tare) | (not form.tared)
     w, y = session.weight, np.where(known, session.pressure_kpa, 0.0)
-    x, sigma = session.reading - (session.tare if form.tared else 0.0), session.noise[:, None] / scale
-    slopes, bends = form.derivatives(np.nan_to_num(x) / scale)
+    x, sigma = above(session, form) / scale, session.noise[:, None] / scale
+    slopes, bends = form.derivatives(np.nan_to_num(x))
     # Noise adds sigma^2 / 2 of its bend to a term, and the product of slopes to that of two (Fuller 1987, section 1.2)
     some, slopes = (known[:, :, None] * each for each in (phi - sigma**2 / 2 * bends, sigma * slopes))
     by_element = some.transpose(1, 2, 0)
@@ -305,9 +382,14 @@ def sums_of(session: ArraySession, form: LawForm, scale: float) -> Sums:
 
 def features(session: ArraySession, form: LawForm, scale: float, tare: "Real | None" = None) -> Real:
     """Terms of the law of every frame and element, (k, n, terms)."""
-    zero = session.tare if tare is None else tare
-    x = session.reading - zero if form.tared else session.reading
-    return form.basis(x / scale, session.time_s, session.past)
+    return form.basis(above(session, form, tare) / scale, session.time_s, session.past)
+
+
+def above(session: ArraySession, form: LawForm, tare: "Real | None" = None) -> Real:
+    """Readings less those without load, which a law without a tare does not take off, (k, n)."""
+    if not form.tared:
+        return session.reading
+    return session.reading - (session.tare + session.recovery(form.tau_s)[0] if tare is None else tare)
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,14 +426,15 @@ class ElementLaw:
         mean = gain * np.einsum("knq,nq->kn", phi, self.at)
         variance = gain**2 * np.einsum("knq,nqr,knr->kn", phi, self.spread, phi, optimize=True)
         variance += (self.unsure * (session.day - self.day) * mean) ** 2
+        if tare is None and self.form.tared:
+            variance += (self.slopes(session) * session.recovery(self.form.tau_s)[1]) ** 2
         zero = session.tare if tare is None else tare
         known = np.isfinite(session.reading) & self.alive & (np.isfinite(zero) | (not self.form.tared))
         return np.where(known, mean, np.nan), np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)
 
     def slopes(self, session: ArraySession, tare: "Real | None" = None) -> Real:
         """Slope of the pressure by the reading, past apart, (k, n); that at rest of a missing one [kPa per unit]."""
-        zero = (session.tare if tare is None else tare) if self.form.tared else 0.0
-        rates = self.form.derivatives(np.nan_to_num(session.reading - zero) / self.scale)[0]
+        rates = self.form.derivatives(np.nan_to_num(above(session, self.form, tare)) / self.scale)[0]
         gain = np.exp(self.drift * (session.day - self.day))
         return np.asarray(gain / self.scale * np.einsum("knq,nq->kn", rates, self.at))
 

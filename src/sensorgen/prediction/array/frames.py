@@ -13,7 +13,7 @@ from sensorgen.core.arrays import Complex, Mask, Real, Whole
 from sensorgen.core.document import Column, Facts, Part, Table, comma_separated, to_json
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
-from sensorgen.prediction.array.elements import Past, doubtful_time
+from sensorgen.prediction.array.elements import Past, doubtful_time, flickering
 from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
 from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, broken_where_dead, own_slopes
 from sensorgen.prediction.array.sessions import ArrayCalibration
@@ -242,8 +242,7 @@ class PressureMaps:
 
     def _names(self, k: int) -> str:
         """First crossings that a frame does not determine."""
-        found = np.argwhere(np.isnan(self.pressure_kpa[k]) & self.model.here).tolist()
-        return ", ".join(f"r{i + 1}c{j + 1}" for i, j in found[:_SHOWN]) + (", ..." if len(found) > _SHOWN else "")
+        return _named(np.isnan(self.pressure_kpa[k]) & self.model.here)
 
     def csv(self) -> Iterator[str]:
         """All frames, a row each."""
@@ -654,6 +653,12 @@ def _back(model: ArrayModel, known: bytes) -> tuple[Callable[[Real], Real], "Rea
     return lambda pressure: inverse @ pressure, (inverse**2).T
 
 
+def _named(which: Mask) -> str:
+    """First crossings of some."""
+    first = np.argwhere(which).tolist()
+    return ", ".join(f"r{i + 1}c{j + 1}" for i, j in first[:_SHOWN]) + (", ..." if len(first) > _SHOWN else "")
+
+
 def _cell(value: float) -> float | None:
     return None if value != value else value
 
@@ -724,7 +729,13 @@ def inverted(
     loaded = ~rest
     if not loaded.any():
         raise BadInput("all frames are at rest; expected some under load")
-    maps = inverter.maps(missing(siemens)[loaded], time_s[loaded], calibration, day)
+    frames = missing(siemens)[loaded]
+    flicker = flickering(time_s[loaded], inverter.by_ratio(frames).reshape(len(frames), -1))
+    flicker = flicker.reshape(model.here.shape)
+    frames[:, flicker] = complex(nan, nan)
+    maps = inverter.maps(frames, time_s[loaded], calibration, day)
+    if flicker.any():
+        maps = replace(maps, by=f"{maps.by}; left out, as they flicker: {_named(flicker)}")
     return maps.on_surface() if surface else maps
 
 

@@ -27,7 +27,7 @@ _FRAMES = 4000  # of a session, at most, by which the interval is set
 _QUIET, _PATTERN = 4.0, 4.0  # standard deviations of noise, and of tares over sessions
 _ODD = 0.02  # share of the elements that may be beyond
 _WINDOW_S, _FEWEST = 1.0, 5  # of a second that is unloaded, and its frames at least
-_SHOWN = 12  # dead elements that are named
+_SHOWN = 12  # elements that are named
 _SURE = 3  # sessions of which tares are known, to recognise another
 
 
@@ -195,33 +195,31 @@ def _law(sums: Sequence[elements.Sums], form: elements.LawForm, scale: float) ->
 
 
 def chosen(sessions: Sequence[elements.ArraySession]) -> elements.LawForm:
-    """Form of the law that leaves the least error in sessions left out; a further term has to lower it by 2 %.
+    """Form of the law that leaves the least error in sessions left out; each term of the past has to lower it by 2 %.
 
-    Powers first, then a play, which is alike at all speeds, then a memory in time, then a drift of the gain; of one
-    session a cubic.
+    Memory in time and play, which is alike at all speeds, are chosen together: either is taken for the other where it
+    comes first. Then the powers, then a drift of the gain, by 2 % too; of one session a cubic.
     """
-    best, error = elements.LawForm(), _left_out(sessions, elements.LawForm())
+    best = elements.LawForm()
     if len(sessions) < 2:
         return best
-    for options in (
-        [replace(best, powers=power) for power in (1, 2)], [replace(best, play=play) for play in PLAYS],
-        [replace(best, tau_s=tau) for tau in TAUS_S], [replace(best, drift=True)],
-    ):  # fmt: skip
-        base, errors = best, [(_left_out(sessions, _joined(best, option)), option) for option in options]
-        least, option = min(errors, key=lambda pair: pair[0])
-        candidate = _joined(base, option)
-        gain = _EARNED if candidate.powers == base.powers else -_EARNED  # fewer powers are the simpler law
-        if least < error * (1 - gain):
-            best, error = candidate, least
+    least = float("inf")
+    for change in ("past", "powers", "drift"):
+        for form in _changed(best, change):
+            terms = bool(form.tau_s) + bool(form.play) + form.drift
+            cost = _left_out(sessions, form) * (1 + _EARNED) ** terms
+            if cost < least:
+                best, least = form, cost
     return best
 
 
-def _joined(base: elements.LawForm, option: elements.LawForm) -> elements.LawForm:
-    """The base with what an option has beyond the usual form."""
-    return replace(
-        base, powers=min(base.powers, option.powers), tau_s=option.tau_s or base.tau_s,
-        drift=option.drift or base.drift, play=option.play or base.play,
-    )  # fmt: skip
+def _changed(base: elements.LawForm, change: str) -> list[elements.LawForm]:
+    """Forms that differ from one by their past, powers or drift."""
+    if change == "past":
+        return [replace(base, tau_s=tau, play=play) for tau in (0.0, *TAUS_S) for play in (0.0, *PLAYS)]
+    if change == "powers":
+        return [replace(base, powers=power) for power in (1, 2)]
+    return [replace(base, drift=True)]
 
 
 def _left_out(sessions: Sequence[elements.ArraySession], form: elements.LawForm) -> float:
@@ -348,7 +346,7 @@ class CalibrationStudy:
     def document(self) -> Iterator[Part]:
         """The law, and a row for each session."""
         yield Facts(tuple(self._facts()))
-        yield from (f"{line}: {of.name}" for of in self.sessions for line in elements.doubtful_time(of.time_s))
+        yield from (f"{line}: {of.name}" for of in self.sessions for line in _doubts(of))
         if not self.errors:
             yield "one session: its errors in another are not known; expected more, of several days"
             return
@@ -375,9 +373,27 @@ class CalibrationStudy:
             else "of one element not known, by total forces alone; expected a bladder or presses too"
         )
         yield "error", f"{own}; all at once {100 * known.common:.2g} %"
-        if (dead := np.flatnonzero(~law.alive) + 1).size:
-            more = ", ..." if dead.size > _SHOWN else ""
-            yield "dead", f"{dead.size} elements, from 1: {', '.join(map(str, dead[:_SHOWN].tolist()))}{more}"
+        if not law.alive.all():
+            yield "dead", _numbered(~law.alive)
+
+
+def _doubts(of: elements.ArraySession) -> Iterator[str]:
+    """Lines on what of a session may not be as it seems."""
+    yield from elements.doubtful_time(of.time_s)
+    if of.flickers.any():
+        yield f"doubtful: {_numbered(of.flickers)} flicker, and are left out"
+    if rate := of.falls[0]:
+        yield (
+            f"doubtful: readings at rest fall by {abs(rate):.2g} a second, as after a load; the tare is that to which "
+            "they fall, expected a minute or more without load before"
+        )
+
+
+def _numbered(which: Mask) -> str:
+    """Elements, and the first of their numbers."""
+    numbers = np.flatnonzero(which) + 1
+    more = ", ..." if numbers.size > _SHOWN else ""
+    return f"{numbers.size} elements, from 1: {', '.join(map(str, numbers[:_SHOWN].tolist()))}{more}"
 
 
 def study(sessions: Sequence[elements.ArraySession], *, by_first: bool = False) -> CalibrationStudy:
@@ -390,10 +406,11 @@ def study(sessions: Sequence[elements.ArraySession], *, by_first: bool = False) 
     """
     sessions = [session.matched(sessions[0].names) for session in sessions]
     _refuse(sessions)
-    pressed = [k for k, session in enumerate(sessions) if np.isfinite(session.pressure_kpa).any()]
-    tested = [k for k in pressed if len(sessions) > 1 and not (by_first and k == 0)]
-    errors = [_tested(sessions, k, list(sessions[:1]) if by_first else training(sessions, k)) for k in tested]
-    return CalibrationStudy(calibrated(sessions), tuple(sessions), tuple(errors), by_first)
+    steady = [session.steady() for session in sessions]
+    first = 1 if by_first or len(steady) == 1 else 0
+    tested = [k for k in range(first, len(steady)) if np.isfinite(steady[k].pressure_kpa).any()]
+    errors = [_tested(steady, k, steady[:1] if by_first else training(steady, k)) for k in tested]
+    return CalibrationStudy(calibrated(steady), tuple(sessions), tuple(errors), by_first)
 
 
 def _refuse(sessions: Sequence[elements.ArraySession]) -> None:
