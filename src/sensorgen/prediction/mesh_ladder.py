@@ -321,7 +321,14 @@ def _smooth(
         return None
     at = np.divide(stress_pa, stress_pa[-1])
     shares = at[:, None] * (np.vander(at, 3) @ np.polyfit(FEW[1:], secants / secants[-1], 2))
-    return _between(fine, np.asarray(stress_pa), *shares.T), coarse
+    (first, last), loaded = _ends(fine), [1] * (len(stress_pa) - 1)
+    bounds = first + shares[:, 1:] * (last - first)
+    continued = replace(
+        fine.some([0, *loaded]),  # with the checks of the last pressure, which are the worst
+        stress_pa=np.array(stress_pa), displacement_m=shares[:, 0] * fine.displacement_m[-1],
+        capacitance_f_per_m2=tuple(Interval(*pair) for pair in bounds.tolist()),
+    )  # fmt: skip
+    return continued, coarse
 
 
 def _may_be_smooth(case: Case, level: int) -> bool:
@@ -332,21 +339,6 @@ def _may_be_smooth(case: Case, level: int) -> bool:
     if case.model == "press2d":
         return not pinches(press2d.cell(case.piece.scene, case.piece.period_mm))
     return case.model == "press3d" and _size(case.model, level - 1) < inf
-
-
-def _between(solution: "Pressed", stress_pa: Real, moved: Real, risen: Real) -> "Pressed":
-    """Solution at rest and at one pressure continued to those between, by shares of displacement and of rise (n,)."""
-    first, last = _ends(solution)
-    return replace(
-        solution,
-        stress_pa=stress_pa,
-        displacement_m=moved * solution.displacement_m[-1],
-        capacitance_f_per_m2=tuple(Interval(*pair) for pair in (first + risen[:, None] * (last - first)).tolist()),
-        carried=(solution.carried[:1] + solution.carried[1:] * (len(stress_pa) - 1)),
-        volume_ratio=1 + moved * (solution.volume_ratio[-1] - 1),
-        penetration=np.zeros_like(stress_pa),
-        imbalance=moved * solution.imbalance[-1],
-    )
 
 
 def _coarser(case: Case, fine: "Pressed", stress_pa: Sequence[float], level: int, *, keep: bool) -> "Pressed":

@@ -154,11 +154,6 @@ class Problem:
         return np.column_stack([slip @ places for slip in pairs.slips]) - pairs.slid_m
 
     @cached_property
-    def _gathered(self) -> csr_matrix:
-        """Forces on the free displacements from all forces."""
-        return self.free.T.tocsr()
-
-    @cached_property
     def pattern(self) -> tuple[csr_matrix, Whole, Whole]:
         """The elements' stiffness on the free displacements, empty; which of their entries it has, and where."""
         number = np.full(self.free.shape[0], -1, np.int32)
@@ -211,7 +206,7 @@ class Problem:
         own = tangent.condensed(residual, self.elements.law.mu_pa)
         inside = np.bincount(self.elements.freedoms.ravel(), own.force.ravel(), len(self.load)).astype(float)
         force = inside + self.contact_force(state.pairs, state.u_m) - state.pressure_pa * self.load
-        return self._gathered @ force, own
+        return self.free.T @ force, own
 
     def newton(self, state: State, pressure_pa: float, pairs: FacePairs, enough: float) -> State | None:
         """Equilibrium at a pressure with frozen contact pairs, or None where Newton's method does not converge.
@@ -238,7 +233,7 @@ class Problem:
         It serves while each step leaves less, and at least ``once``: the first step at another load leaves more,
         whichever stiffness it is by. Not so where faces stick and an earlier stiffness lets them slide.
         """
-        scale = max(state.pressure_pa, _LEAST * self.penalty_pa) * np.abs(self._gathered @ self.load).max()
+        scale = max(state.pressure_pa, _LEAST * self.penalty_pa) * np.abs(self.free.T @ self.load).max()
         rest, unbalanced = self._residual(state, by.elements)
         worst, fast = np.abs(rest).max(), True
         while not (worst < enough * scale and unbalanced.imbalance < enough):
