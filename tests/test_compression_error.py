@@ -13,7 +13,8 @@ from sensorgen.design.design import make
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
-from sensorgen.prediction import mesh_ladder
+from sensorgen.prediction import bodies, mesh_ladder
+from sensorgen.prediction.sensor_model import piece
 from sensorgen.solvers.contact import pressed
 
 OTHER = {"period_mm": 1.2, "hang_height_mm": 0.4, "lower_height_mm": 0.2, "dielectric_mm": 0.05}
@@ -96,6 +97,30 @@ def test_a_plate_between_fixed_sides_as_the_closed_form_has_it():
     assert abs(found.found.displacement_m[1] - down) < found.displacement_error_m[1] < 0.01 * down
     rise = 0.27625066e-12 / 4e-6 * thinner / (0.6e-3 - thinner)
     assert abs(found.rise_f_per_m2[1] - rise) < found.rise_error_f_per_m2[1] < 0.02 * rise
+
+
+def test_loads_between_are_those_of_the_coarser_meshs_curve(monkeypatch):
+    """Of a print, in which nothing touches, as if each were solved; of a drawn cell, whose gaps close, each is."""
+    solved, loads = [], [0.0, 1e4, 3e4, 6e4, 8e4, 1e5]
+    pressed_on = mesh_ladder.pressed
+
+    def recorded(case, stress_pa, level=0, **more):
+        solved.append((level, list(stress_pa)))
+        return pressed_on(case, stress_pa, level, **more)
+
+    monkeypatch.setattr(mesh_ladder, "pressed", recorded)
+    printed = piece(bodies.estimated(make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}}), "arachne"))
+    of = mesh_ladder.Case(printed, "press2d", SOLIDS, EPS, BoundaryConditions())
+    few = estimated(loads=loads, of=of)
+    monkeypatch.setattr(mesh_ladder, "_BENT", 0.0)
+    every = estimated(loads=loads, of=of)
+    assert few.found.displacement_m == pytest.approx(every.found.displacement_m, rel=5e-4)
+    assert (np.abs(few.rise_f_per_m2 - every.rise_f_per_m2) <= every.rise_error_f_per_m2 / 20).all()
+    assert few.rise_error_f_per_m2 == pytest.approx(every.rise_error_f_per_m2, rel=0.05)
+    monkeypatch.undo()
+    monkeypatch.setattr(mesh_ladder, "pressed", recorded)
+    estimated(loads=loads)
+    assert [some for level, some in solved if level == 0] == [[0.0, 1e5], loads, loads]
 
 
 @pytest.mark.nightly

@@ -17,7 +17,7 @@ from sensorgen.core.arrays import Mask, Real, Whole
 
 _Short = NDArray[np.float32]
 _PIVOT = 1e-3  # share of its column below which a pivot of an indefinite matrix is exchanged [-]
-_LEAST = 60  # unknowns that are not halved any more
+_LEAST = 100  # unknowns that are not halved any more
 _MOST_TURNS = 30  # of conjugate gradients, before new factors are made
 _ENOUGH = 1e-4  # residual over right side: Newton's method takes the rest away [-]
 
@@ -52,7 +52,7 @@ class Lu:
         """Solution, or None where the matrix is singular."""
         if not (self._last and self._last[0] is matrix):
             try:
-                factors = splu(matrix.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=_PIVOT, **_SPARSE)
+                factors = splu(matrix.T, permc_spec="NATURAL", diag_pivot_thresh=_PIVOT, **_SPARSE)
             except RuntimeError:
                 return None
             self._last = matrix, factors
@@ -181,15 +181,21 @@ class Factors:
 
 
 def factored(matrix: csr_matrix, order: Order) -> Factors | None:
-    """Factors of a matrix, or None where it is not positive."""
+    """Factors of a matrix, or None where it is not positive; of single precision where this shows that it is."""
+    turned = matrix[order.turn][:, order.turn].tocsr()
+    return _factored(turned, order, np.float32) or _factored(turned, order, np.float64)
+
+
+def _factored(turned: csr_matrix, order: Order, kind: type[np.floating]) -> Factors | None:
+    """Factors of a matrix in the order of elimination, worked out in numbers of some kind."""
     from scipy.linalg import lapack
 
-    turned = matrix[order.turn][:, order.turn].tocsr()
+    cholesky, inverted = lapack.get_lapack_funcs(("potrf", "trtri"), dtype=kind)
     rests: dict[int, Real] = {}
     parts: list[tuple[_Short, _Short]] = []
     for number, front in enumerate(order.fronts):
         n = front.stop - front.start
-        whole = np.zeros((n + len(front.outer),) * 2)  # its own entries, and what its children leave
+        whole = np.zeros((n + len(front.outer),) * 2, kind)  # its own entries, and what its children leave
         low, high = turned.indptr[front.start], turned.indptr[front.stop]
         rows = np.repeat(np.arange(n), np.diff(turned.indptr[front.start : front.stop + 1]))
         columns = turned.indices[low:high]
@@ -197,11 +203,11 @@ def factored(matrix: csr_matrix, order: Order) -> Factors | None:
         whole[rows[later], front.local(columns[later])] = turned.data[low:high][later]
         for child in front.children:
             at = front.local(order.fronts[child].outer)
-            whole[np.ix_(at, at)] += rests.pop(child)
-        lower, failed = lapack.dpotrf(whole[:n, :n], lower=True, clean=True)
+            whole.ravel()[len(whole) * at[:, None] + at] += rests.pop(child)  # sooner than by rows and columns
+        lower, failed = cholesky(whole[:n, :n], lower=True, clean=True)
         if failed:
             return None
-        inverse = np.ascontiguousarray(lapack.dtrtri(lower, lower=True)[0]) if n else lower
+        inverse = np.ascontiguousarray(inverted(lower, lower=True)[0]) if n else lower
         coupling = inverse @ whole[:n, n:]
         parts.append((inverse.astype(np.float32), coupling.astype(np.float32)))
         rests[number] = whole[n:, n:] - coupling.T @ coupling

@@ -25,6 +25,9 @@ _MOST_CUTS, _MORE_CUTS = 4, 4  # failed load steps in all before partners may st
 _FLAT = 1e-3  # gaps that differ by less than this share of their side close at once [-]
 _DEEPEST = 0.1  # initial penetration of a part that is lowered, over the length of a side [-]
 _ROUNDING = 1e-9
+_SWINGING = 0.5  # of a change of partners over the one before, above which they swing between two places [-]
+_CLOSE = 0.5  # gap over a face's side, below which contact begins with the first loads [-]
+_LONGER = 2.5  # longest load step while no faces touch, over that in contact [-]
 
 
 @dataclass(frozen=True)
@@ -153,15 +156,17 @@ class Problem:
     @cached_property
     def pattern(self) -> tuple[csr_matrix, Whole, Whole]:
         """The elements' stiffness on the free displacements, empty; which of their entries it has, and where."""
-        number = np.full(self.free.shape[0], -1)
+        number = np.full(self.free.shape[0], -1, np.int32)
         number[np.diff(self.free.indptr) > 0] = self.free.indices
         here = number[self.elements.freedoms]
         size, n = here.shape[1], self.free.shape[1]
         rows, columns = np.repeat(here, size, axis=1).ravel(), np.tile(here, (1, size)).ravel()
         inside = np.flatnonzero((rows >= 0) & (columns >= 0))
-        entries, place = np.unique(rows[inside] * n + columns[inside], return_inverse=True)
-        starts = np.searchsorted(entries, n * np.arange(n + 1))
-        return csr_matrix((np.zeros(len(entries)), entries % n, starts), (n, n)), inside, place
+        at = rows[inside], columns[inside]
+        empty = coo_matrix((np.zeros(len(inside)), at), (n, n)).tocsr()
+        # Sooner than sorting all entries: each is looked up by its number from 1 on
+        numbered = csr_matrix((np.arange(1, empty.nnz + 1), empty.indices, empty.indptr), empty.shape)
+        return empty, inside, np.asarray(numbered[at]).ravel() - 1
 
     def _springs(self, pairs: FacePairs, u: Real) -> Iterator[tuple[csr_matrix, Mask, Real]]:
         """Rows of what the contact acts on, gaps and slips, on which of them it does, and how far each is moved [m]."""
@@ -208,23 +213,25 @@ class Problem:
 
         The last stiffness, of an earlier state, serves first. ``enough`` is the residual to reach, over the load [-].
         """
-        here, own = replace(state, pressure_pa=pressure_pa, pairs=pairs), not self._last
+        here = replace(state, pressure_pa=pressure_pa, pairs=pairs)
         for _ in range(_MOST_STEPS):
-            if own:
-                self._last[:] = [self._linearised(here)]
-            reached, balanced = self._descended(here, self._last[0], enough, own=own)
-            if reached is None:
-                break
-            if balanced:
+            is_new = not self._last
+            if is_new:
+                self._last.append(self._linearised(here))
+            reached, balanced = self._descended(here, self._last[0], enough, once=is_new or not self.stick)
+            if reached and balanced:
                 return reached
-            here, own = reached, True
-        self._last.clear()
+            self._last.clear()
+            if reached is None and is_new:
+                return None
+            here = reached or here
         return None
 
-    def _descended(self, state: State, by: Stiffness, enough: float, *, own: bool) -> tuple[State | None, bool]:
+    def _descended(self, state: State, by: Stiffness, enough: float, *, once: bool) -> tuple[State | None, bool]:
         """State as far as one stiffness serves, and whether it is balanced; None where no step is possible.
 
-        A state's ``own`` stiffness serves at least once; that of another one, while each step leaves less.
+        It serves while each step leaves less, and at least ``once``: the first step at another load leaves more,
+        whichever stiffness it is by. Not so where faces stick and an earlier stiffness lets them slide.
         """
         scale = max(state.pressure_pa, _LEAST * self.penalty_pa) * np.abs(self.free.T @ self.load).max()
         rest, unbalanced = self._residual(state, by.elements)
@@ -232,12 +239,12 @@ class Problem:
         while not (worst < enough * scale and unbalanced.imbalance < enough):
             after = self._moved(state, by, rest, unbalanced) if fast else None
             if after is None:
-                return None if own else state, False
+                return None if once else state, False
             (rest, unbalanced), before = self._residual(after, by.elements), worst
             worst = np.abs(rest).max()
-            if not (own or worst < before):
+            if not (once or worst < before):
                 return state, False
-            moved, own, fast = np.abs(after.u_m - state.u_m).max(), False, worst < _SLOW * before
+            moved, once, fast = np.abs(after.u_m - state.u_m).max(), False, worst < _SLOW * before
             state = after
             if moved <= _STILL * np.abs(state.u_m).max() and unbalanced.imbalance < _NEARLY:
                 break
@@ -256,10 +263,18 @@ class Problem:
                 return replace(state, u_m=u, inner=inner)
         return None
 
+    def touches(self, state: State, share: float = 0.0) -> bool:
+        """Test whether faces touch, or are nearer than a share of their sides."""
+        return bool((self.gaps(state.pairs, state.u_m) < share * state.pairs.length_m).any())
+
+    def begins_in_contact(self) -> bool:
+        """Test whether faces may touch at small loads, or stick, where the load at first touch counts."""
+        return self.stick or bool(self.loose.any()) or self.touches(self.start(), _CLOSE)
+
     def extrapolated(self, state: State, before: State, pressure_pa: float) -> State:
-        """Start of Newton's method by the last load step's direction; the state itself where there is contact."""
+        """Start of Newton's method by the last load step's direction, where there is no contact."""
         gone = state.pressure_pa - before.pressure_pa
-        if not (before.pressure_pa and gone) or (self.gaps(state.pairs, state.u_m) < 0).any():
+        if not (before.pressure_pa and gone):
             return state
         share = (pressure_pa - state.pressure_pa) / gone
         u = state.u_m + share * (state.u_m - before.u_m)
@@ -268,33 +283,47 @@ class Problem:
         return state if inside_out else replace(state, u_m=u, inner=inner)
 
     def stepped(
-        self, state: State, pressure_pa: float, before: State, *, keeps: bool = False
+        self, state: State, pressure_pa: float, before: State, *, is_long: bool = False, keeps: bool = False
     ) -> State | None:  # fmt: skip
         """One load step: solve, update the contact pairs and solve again, until they are settled or often enough.
 
+        Where nothing touches, before or after, it is solved once, without contact: old partners may seem to touch. A
+        long step is one without contact.
         With ``keeps`` the pairs of a problem with a test of its places stay where new ones have no equilibrium, as
         where a face slides off an edge.
         """
-        start = self.extrapolated(state, before, pressure_pa)
-        starts = [start] if start is state else [start, state]
-        tries = (self.newton(start, pressure_pa, state.pairs, _NEARLY) for start in starts)
-        reached = next(filter(None, tries), None)
+        reached = None
+        if not self.touches(state):
+            reached = self._alone(self.extrapolated(state, before, pressure_pa), pressure_pa)
+        if reached is None and not is_long:
+            reached = self._in_contact(state, pressure_pa, keeps=keeps and self.sound is not None)
+        return reached if reached and (self.sound is None or self.sound(self.places(reached.u_m))) else None
+
+    def _alone(self, start: State, pressure_pa: float) -> State | None:
+        """Equilibrium without contact, or None where there is none or faces touch there."""
+        nothing = start.pairs.some(np.zeros(len(start.pairs.point), bool))
+        reached = self.newton(start, pressure_pa, nothing, _ENOUGH)
+        reached = reached and replace(reached, pairs=self.project(reached.u_m))
+        return None if reached is None or self.touches(reached) else reached
+
+    def _in_contact(self, state: State, pressure_pa: float, *, keeps: bool) -> State | None:
+        """Equilibrium with pairs that are updated and settled; None where some have none, unless the last ones stay."""
+        reached = self.newton(state, pressure_pa, state.pairs, _NEARLY)
         if reached is None:
             return None
         stuck = self._stuck(state.u_m, reached) if self.stick else None
-        reached = self._updated(reached, stuck, keeps=keeps and self.sound is not None)
-        return reached if reached and (self.sound is None or self.sound(self.places(reached.u_m))) else None
-
-    def _updated(self, reached: State, stuck: FacePairs | None, *, keeps: bool) -> State | None:
-        """Equilibrium with pairs that are updated and settled; None where some have none, unless the last ones stay."""
-        pressure_pa, pairs = reached.pressure_pa, self.project(reached.u_m, stuck)
+        pairs, last = self.project(reached.u_m, stuck), np.inf
         for _ in range(self.updates):
             again = self.newton(reached, pressure_pa, pairs, _ENOUGH)
             if again is None:
                 return self.newton(reached, pressure_pa, reached.pairs, _ENOUGH) if keeps else None
-            reached, pairs = again, self.project(again.u_m, stuck)
-            if self._change(reached, pairs) < self.settled:
+            before, reached, pairs = reached, again, self.project(again.u_m, stuck)
+            change = self._change(reached, pairs)
+            if change < self.settled:
                 break
+            if change > _SWINGING * last:
+                pairs = self.project((before.u_m + reached.u_m) / 2, stuck)
+            last = change
         return reached
 
     def _change(self, state: State, pairs: FacePairs) -> float:
@@ -316,20 +345,25 @@ class Problem:
 
 
 def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) -> Iterator[State]:
-    """Equilibria at increasing pressures, and at each step of at most ``longest_pa`` between; ends where steps fail."""
+    """Equilibria at increasing pressures, and at each step between; ends where steps fail.
+
+    Steps are of at most ``longest_pa``, or more while no faces touch.
+    """
     state = problem.start()
     yield state
     state = before = problem.lowered(state, min(pressures_pa[1], longest_pa))
-    step, cuts = longest_pa, 0
+    step, cuts = _LONGER * longest_pa, 0
     for target in pressures_pa[1:]:
         while state.pressure_pa < target:
+            step = min(step, longest_pa if problem.touches(state) else _LONGER * longest_pa)
             left = target - state.pressure_pa
             aim = target if left < step * (1 + _ROUNDING) else state.pressure_pa + step
-            reached = problem.stepped(state, aim, before, keeps=cuts >= _MOST_CUTS)
+            is_long = aim - state.pressure_pa > longest_pa * (1 + _ROUNDING)
+            reached = problem.stepped(state, aim, before, is_long=is_long, keeps=cuts >= _MOST_CUTS)
             if reached is not None:
-                before, state, step = state, reached, min(2 * step, longest_pa)
+                before, state, step = state, reached, 2 * step
                 yield state
                 continue
-            cuts, step = cuts + 1, min(step, left) / 2
+            cuts, step = cuts + (not is_long), longest_pa if is_long else min(step, left) / 2
             if cuts > _MOST_CUTS + _MORE_CUTS:
                 return

@@ -212,7 +212,7 @@ def solve(
         free = free_of(mesh.points_m, boundary)
         problem = Problem(elements, faces, free, load, penalty, stick, sound=sound, settled=_SETTLED, updates=_UPDATES)
         problem = replace(problem, free=free[:, elimination_order(problem.pattern[0])])
-        ramp = [k * longest * softest for k in _FIRST]
+        ramp = [k * longest * softest for k in _FIRST] if problem.begins_in_contact() else []
     else:
         used = np.isin(np.arange(len(mesh.points_m)), mesh.outer)
         free = free_of(mesh.points_m, boundary, mesh.bricks.spans_m(), used)
