@@ -246,7 +246,7 @@ def invert_calibrated(calibration: str, task: Task) -> int:
 
     from sensorgen.core import files
     from sensorgen.measure.array_frames import session
-    from sensorgen.prediction.array.sessions import stored
+    from sensorgen.prediction.array.sessions import doubts, stored
 
     refuse_typed(_OF_DESIGNS, "has no meaning with a calibration of an array; mark unloaded frames in 'rest'")
     measured, output, known = task.measured, task.output, stored(Path(calibration))
@@ -256,8 +256,10 @@ def invert_calibrated(calibration: str, task: Task) -> int:
     if of.reading.shape[1] != len(known.law.alive):
         raise BadInput(f"{measured}: {of.reading.shape[1]} elements; expected {len(known.law.alive)}, as calibrated")
     free = of.unloaded if of.rest.any() else known.recognised(of)
-    tare = replace(of, rest=free).tare
-    mean, half = known.pressures(of, tare)
+    of = replace(of, rest=free)
+    for line in doubts(of):
+        render.say(f"{measured}: {line}", err=output in ("", "-"))
+    mean, half = known.pressures(of.steady())
     elements = known.names or range(1, mean.shape[1] + 1)
     names = [f"{part}_{element}_kpa" for element in elements for part in ("p", "half")]
     both = np.stack([mean, half], -1).reshape(len(mean), -1)

@@ -543,7 +543,7 @@ def under_tops(
     own : CapacitanceCurve
         Under the tip.
     """
-    loads, level = mesh_ladder.few(own.stress_pa), mesh_ladder.coarsest(model)
+    loads, level = [own.stress_pa[-1] * share for share in mesh_ladder.COARSE], mesh_ladder.coarsest(model)
 
     def rise(block: str) -> Real:
         try:
@@ -571,7 +571,7 @@ def under_tops(
 def _few_pa(stress_pa: float, tip: Tip) -> Real:
     """A few pressures up to beyond one, where it is among those of :func:`under_tops` these [Pa]."""
     last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
-    usual = np.array(mesh_ladder.few(stresses_pa(stress_pa)))
+    usual = stresses_pa(stress_pa)[-1] * np.array(mesh_ladder.COARSE)
     is_usual = stress_pa <= last_pa and not tip.soft and stress_pa in usual
     return usual if is_usual else last_pa * np.array([0.0, 0.4, 0.8, 1.0])
 

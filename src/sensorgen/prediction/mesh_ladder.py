@@ -44,7 +44,7 @@ VERIFIED = 7.5e-3  # error of the rise below which nothing is stated: other prog
 _OF_DISPLACEMENT = 0.6  # error of the displacement over that of the rise, as expected [-]
 _PIECES_ORDER = 2  # power of the number of pieces with which the mesh's error falls, as another program shows it [-]
 _DOUBT = 0.5  # error of where two meshes lead, over how far that is beyond the finer one; 0.25 was seen [-]
-_COARSE = (0.0, 0.25, 0.5, 1.0)  # pressures of a coarse mesh, besides the first one, over the last one [-]
+COARSE = (0.0, 0.25, 0.5, 1.0)  # pressures at which a coarse mesh serves, over the last one [-]
 _BENT = 5e-3  # change of such a curve where its second load is left out, at most: all of them are off by 2e-4 [-]
 _ARRAYS = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
 _TUPLES = ("faults", "doubts", "carried", "apex_m")
@@ -299,11 +299,10 @@ def estimated(
     return (_limit if case.model == "press3d" else _errors)(case, fine, coarse, level)
 
 
-def few(stress_pa: Sequence[float]) -> list[float]:
-    """The pressures, of some rising from 0, at which a coarse mesh serves: to compare meshes, tops or prints [Pa]."""
+def _few(stress_pa: Sequence[float]) -> list[float]:
+    """Those of some pressures, rising from 0, that are nearest to ``COARSE`` [Pa]."""
     loads = np.asarray(stress_pa)
-    shares = [int(abs(loads - share * loads[-1]).argmin()) for share in _COARSE]
-    return [float(loads[k]) for k in sorted({min(1, len(loads) - 1), *shares})]
+    return [float(loads[k]) for k in sorted({int(abs(loads - share * loads[-1]).argmin()) for share in COARSE})]
 
 
 def _smooth(
@@ -313,22 +312,23 @@ def _smooth(
 
     None where faces touch, or the curve bends too much for that.
     """
-    loads = few(stress_pa)
+    loads = _few(stress_pa)
     if len(stress_pa) <= len(loads) or not _may_be_smooth(case, level):
         return None
     coarse = pressed(case, loads, level - 1, keep=keep)
     if coarse.faults or coarse.penetration.any():
         return None
-    some = np.divide(loads[-3:], loads[-1])  # a quarter, half and all, as near as there are pressures
-    secants = np.column_stack([coarse.displacement_m, _rise(coarse)[0]])[-3:] / some[:, None]
-    share = (1 - some[1]) / (1 - some[0])
-    if np.abs((share * secants[0] + (1 - share) * secants[2]) / secants[1] - 1).max() > _BENT:
+    some = np.divide(loads[1:], loads[-1])
+    secants = np.column_stack([coarse.displacement_m, _rise(coarse)[0]])[1:] / some[:, None]
+    (quarter, half, whole), share = secants[-3:], (1 - some[-2]) / (1 - some[-3])
+    if np.abs((share * quarter + (1 - share) * whole) / half - 1).max() > _BENT:
         return None
     fine = pressed(case, [0.0, stress_pa[-1]], level, keep=keep, step=step)
     if fine.faults or fine.penetration.any():
         return None
     at = np.divide(stress_pa, stress_pa[-1])
-    shares = at[:, None] * (np.vander(at, 3) @ np.polyfit(some, secants / secants[-1], 2))
+    curve = np.polyfit(some, secants / whole, len(some) - 1)
+    shares = at[:, None] * (np.vander(at, len(some)) @ curve)
     (first, last), loaded = _ends(fine), [1] * (len(stress_pa) - 1)
     bounds = first + shares[:, 1:] * (last - first)
     continued = replace(
@@ -353,7 +353,7 @@ def _coarser(case: Case, fine: "Pressed", stress_pa: Sequence[float], level: int
     """Solution on the next coarser mesh at some pressures of a finer one; unloaded where there is no such mesh."""
     if len(fine.stress_pa) == 1 or _size(case.model, level - 1) == inf:
         return fine.first(1)
-    some = few(fine.stress_pa.tolist())
+    some = _few(fine.stress_pa.tolist())
     with suppress(cached.Unknown), cached.only_known():
         if keep:  # the level before was not accurate enough: it is stored
             known = pressed(case, stress_pa, level - 1).sound()

@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sensorgen.core.arrays import Mask, Real
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import BadInput
 
 TARE_S = 20.0  # unloaded seconds of a session that are its tare
@@ -32,13 +32,16 @@ _RESPONDS = 0.5  # share of the variance of a reference that a live element's re
 _N_PER_KPA_MM2 = 1e-3
 _PART = 0.9  # of what an element's readings tell, at most, that is taken for noise
 _LONG_S = 5.0  # from a frame to the next: longer is doubtful
-_RECOVERY_S = 100.0  # of what an earlier load left, where the law has no memory
-_UNSURE = 0.6  # relative error of that: half to double the time
-_FALLS, _RESTS_S, _TELL = 4.0, 5.0, 10  # standard errors, seconds of rest, and elements, that tell of a fall at rest
-_JUMP_S, _NEAR = 0.1, 2  # of a window, shorter than any load of a foot, and its frames on either side at least
+_RECOVERY_S, _FACTOR = 100.0, 3.0  # of the decay of what an earlier load left, and what it may be off
+_TIMES_S = np.geomspace(1.0, 400.0, 25)  # that are tried
+_COMMON = 4.0  # square of what is common to elements and lasts, over what the best of these times leaves
+_FALLS, _RESTS_S, _TELL = 4.0, 5.0, 6  # standard errors, seconds of rest, and elements, that tell of a fall at rest
+_JUMP_S, _NEAR, _SAMPLES = 0.1, 2, 11  # of a window, its frames on either side at least, and those that are looked at
 _JUMP, _JUMPS, _FEW = 0.15, 0.01, 4  # of what elements span; share of the frames, and frames, that may jump by it
+_ALIKE = 1 / 3  # of the elements with a load, that jump at once: more is the load
+_MOST_FRAMES, _LOT = 10_000, 64  # in the middle of a recording, and elements, that are looked at together
 _MEDIAN = 1.858  # standard error of a Gaussian sample's median, over its median deviation and root of its size
-_NOISES = 6.0  # standard deviations of noise, that are no jump
+_NOISES, _STEPS = 6.0, 1.5  # standard deviations of noise, and steps of whole counts, that are no jump
 
 
 @dataclass
@@ -155,41 +158,73 @@ class ArraySession:
         return flickering(self.time_s, self.reading)
 
     def steady(self) -> "ArraySession":
-        """The session without the readings of elements that flicker; itself where none does."""
+        """The session without the readings of elements that flicker; itself where none does.
+
+        Raises
+        ------
+        BadInput
+            All do.
+        """
         if not self.flickers.any():
             return self
+        if self.flickers[np.isfinite(self.reading).any(0)].all():
+            raise BadInput(
+                f"{self.name}: all elements jump and come back within {_JUMP_S:g} s; expected time_s in seconds"
+            )
         return replace(self, reading=np.where(self.flickers, np.nan, self.reading))
 
     @cached_property
-    def falls(self) -> tuple[float, float]:
-        """Rate at which all readings fall at rest towards those without load, and its standard error [1/s]; 0 of none.
+    def _at_rest(self) -> Whole:
+        """Numbers of the frames of the first unloaded stretch."""
+        of = np.flatnonzero(self.unloaded)
+        return np.split(of, np.flatnonzero(np.diff(of) > 1) + 1)[0]
 
-        A rest that begins the recording, and whose readings fall together, follows an earlier load.
+    @cached_property
+    def falls(self) -> float:
+        """Rate at which all readings fall at rest towards those without load [1/s]; 0 where they do not.
+
+        A rest that begins the recording, and whose readings fall together, follows an earlier load on all of them.
         """
-        time_s = self.time_s[self.unloaded]
+        time_s = self.time_s[self._at_rest]
         if time_s[0] > self.time_s[0] + _RESTS_S or np.ptp(time_s) < _RESTS_S:
-            return 0.0, 0.0
+            return 0.0
         away = time_s - time_s.mean()
-        slopes = away @ (self.reading[self.unloaded] - self.tare) / (away @ away)
-        slopes = slopes[np.isfinite(slopes)]
-        if slopes.size < _TELL:
-            return 0.0, 0.0
+        x = (self.reading - self.tare)[self._at_rest]
+        x = x[:, np.isfinite(x).all(0)]
+        if x.shape[1] < _TELL:
+            return 0.0
+        slopes = away @ x / (away @ away)
         rate = float(np.median(slopes))
-        error = float(np.median(np.abs(slopes - rate)) * _MEDIAN / np.sqrt(slopes.size))
-        loaded = float(np.nanmedian(_mean(self.reading - self.tare)))
-        return (rate, error) if abs(rate) > _FALLS * error and rate * loaded < 0 else (0.0, 0.0)
+        own = float(np.median(np.abs(slopes - rate))) * _MEDIAN / np.sqrt(slopes.size)
+        common = float(np.std(np.median(x, 1) - rate * away)) / np.sqrt(away @ away)
+        above = _mean(self.reading - self.tare)
+        loaded = above[np.nanargmax(np.abs(above))]
+        return rate if abs(rate) > _FALLS * np.hypot(own, common) and rate * loaded < 0 else 0.0
 
-    def recovery(self, tau_s: float) -> tuple[Real, Real]:
+    @cached_property
+    def recovery(self) -> tuple[Real, Real]:
         """Reading above the tare that an earlier load left, and its error, (k, 1): as it decays, and is below after.
 
-        It decays as the law's memory does, in 100 s without one. A rest of seconds leaves that time open: half or
-        double of it is in the error.
+        The median over elements at rest tells the time of the decay, which before is 100 s up to a factor of 3; what
+        both leave open is in the error.
         """
-        rate, error = self.falls
-        tau_s = tau_s or _RECOVERY_S
-        decay = np.exp(-(self.time_s - self.time_s[0]) / tau_s)[:, None]
-        above = tau_s * (1 - decay / decay[self.unloaded].mean())
-        return rate * above, np.hypot(error, _UNSURE * rate) * above
+        nothing = np.zeros((len(self.time_s), 1))
+        if not self.falls:
+            return nothing, nothing
+        rest = (self.reading - self.tare)[self._at_rest]
+        y = np.median(rest[:, np.isfinite(rest).all(0)], 1)
+        decays = np.exp(-(self.time_s - self.time_s[0]) / _TIMES_S[:, None])
+        decays -= decays[:, self.unloaded].mean(1, keepdims=True)
+        at_rest = decays[:, self._at_rest]
+        sizes = (at_rest @ y) / (at_rest**2).sum(1)
+        cost = ((y - sizes[:, None] * at_rest) ** 2).sum(1)
+        off = np.log(_TIMES_S / _RECOVERY_S) / np.log(_FACTOR)
+        noise = _COMMON * cost.min() / max(len(y) - 2, 1) + 1e-30
+        weight = np.exp(-(cost - cost.min()) / (2 * noise) - off**2 / 2)
+        weight /= weight.sum()
+        curves = sizes[:, None] * decays
+        mean = weight @ curves
+        return mean[:, None], np.sqrt(weight @ (curves - mean) ** 2)[:, None]
 
     @cached_property
     def noise(self) -> Real:
@@ -227,15 +262,15 @@ def _mean(values: Real) -> Real:
 def flickering(time_s: Real, reading: Real) -> Mask:
     """Elements that in more than a hundredth of the frames jump and come back within a tenth of a second, (n,).
 
-    No load of a foot is that short: a loose wire is, or a multiplexer that shows another element. Frames that are
-    farther apart show neither.
+    A loose wire does, or a multiplexer that shows another element; a load that is as short moves its neighbours at
+    once. Slower than some 40 frames/s none is recognised. Of a long recording its middle is looked at.
 
     Parameters
     ----------
     time_s : (k,) array
         Of each frame [s].
     reading : (k, n) array
-        Of each element, in any unit.
+        Of each element, in any unit; nan where one is missing.
     """
     from scipy.ndimage import median_filter
 
@@ -243,13 +278,29 @@ def flickering(time_s: Real, reading: Real) -> Mask:
     near = int(_JUMP_S / step / 2 + 0.1) if step > 0 else 0
     if near < _NEAR or len(time_s) < 2 * near + 1:
         return np.zeros(reading.shape[1], bool)
-    x = np.nan_to_num(reading)
-    around = median_filter(x, (2 * near + 1, 1))
+    start = max(0, len(reading) - _MOST_FRAMES) // 2
+    x = _last_known(reading[start : start + _MOST_FRAMES])
+    window = np.zeros((2 * near + 1, 1), bool)
+    window[np.unique(np.linspace(0, 2 * near, _SAMPLES).round().astype(int))] = True
+    around = np.hstack([
+        median_filter(x[:, k : k + _LOT], footprint=window) for k in range(0, x.shape[1], _LOT)
+    ])  # fmt: skip
     low, high = np.quantile(around[:: max(1, len(x) // 2000)], (0.02, 0.98), axis=0)
-    span = np.quantile(high - low, 0.75)  # of one that is loaded
-    noise = np.median(np.abs(np.diff(x, axis=0)), 0)
-    jumps = (np.abs(x - around) > np.maximum(_JUMP * span, _NOISES * noise)).sum(0)
-    return np.asarray(jumps > max(_JUMPS * len(x), _FEW))
+    spans, change = high - low, np.abs(np.diff(x, axis=0))
+    noise = np.maximum(_NOISES * np.median(change, 0), _STEPS * change[change > 0].min(initial=np.inf))
+    noise = np.where(np.isfinite(noise), noise, 0.0)
+    least = np.maximum(_JUMP * max(float(np.quantile(spans, 0.75)), 0.3 * float(spans.max())), noise)
+    beside = np.pad(change > least, ((1, 1), (0, 0)))
+    jump = (np.abs(x - around) > least) & (beside[1:] | beside[:-1])
+    of_load = jump.sum(1) > _ALIKE * max(int((spans > least).sum()), 1 / _ALIKE)
+    return np.asarray(jump[~of_load].sum(0) > max(_JUMPS * len(x), _FEW))
+
+
+def _last_known(values: Real) -> Real:
+    """Values, (k, n), with the last one before where one is missing, or the first one; 0 in columns without any."""
+    known = np.isfinite(values)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(values))[:, None], 0), 0)
+    return np.nan_to_num(np.take_along_axis(values, np.maximum(last, known.argmax(0)), 0))
 
 
 def doubtful_time(time_s: Real) -> Iterator[str]:
@@ -389,7 +440,7 @@ def above(session: ArraySession, form: LawForm, tare: "Real | None" = None) -> R
     """Readings less those without load, which a law without a tare does not take off, (k, n)."""
     if not form.tared:
         return session.reading
-    return session.reading - (session.tare + session.recovery(form.tau_s)[0] if tare is None else tare)
+    return session.reading - (session.tare + session.recovery[0] if tare is None else tare)
 
 
 @dataclass(frozen=True, eq=False)
@@ -419,15 +470,20 @@ class ElementLaw:
     unsure: float
     alive: Mask
 
-    def pressures(self, session: ArraySession, tare: "Real | None" = None) -> tuple[Real, Real]:
-        """Pressures of a session and their standard errors by the parameters alone, (k, n); nan of no reading [kPa]."""
+    def pressures(
+        self, session: ArraySession, tare: "Real | None" = None, *, doubt: bool = True
+    ) -> tuple[Real, Real]:  # fmt: skip
+        """Pressures of a session, and standard errors by the parameters, (k, n); nan of no reading [kPa].
+
+        With ``doubt`` those of a rest that falls are among them.
+        """
         phi = features(session, self.form, self.scale, tare)
         gain = np.exp(self.drift * (session.day - self.day))
         mean = gain * np.einsum("knq,nq->kn", phi, self.at)
         variance = gain**2 * np.einsum("knq,nqr,knr->kn", phi, self.spread, phi, optimize=True)
         variance += (self.unsure * (session.day - self.day) * mean) ** 2
-        if tare is None and self.form.tared:
-            variance += (self.slopes(session) * session.recovery(self.form.tau_s)[1]) ** 2
+        if doubt and tare is None and self.form.tared:
+            variance += (self.slopes(session) * session.recovery[1]) ** 2
         zero = session.tare if tare is None else tare
         known = np.isfinite(session.reading) & self.alive & (np.isfinite(zero) | (not self.form.tared))
         return np.where(known, mean, np.nan), np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)

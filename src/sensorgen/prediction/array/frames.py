@@ -23,7 +23,7 @@ from sensorgen.solvers.tracks import CrossingReadings, Tracks, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
 _STEPS, _RENEWED = 25, 5  # of Gauss-Newton, and after how many the slopes are renewed
-_DONE = 0.02  # of a standard error: a smaller step ends it
+_DONE, _FAR = 0.02, 1.0  # of a standard error: a smaller step ends it, a larger one needs other slopes
 _HEAVIER = 1.1  # times the heaviest frame so far: a later one is compared with the network too
 _SUFFICES = 0.5  # standard error by which C/C0 may differ from the network
 _ALIVE = 3.0  # factor of a reading at rest to the predicted one; prints differ by less
@@ -486,9 +486,10 @@ class MapInverter:
             else:
                 step = gain @ off.ravel() - variance * ((c - start) / self.prior_f**2).ravel()
             before, c = c, np.maximum(c + step.reshape(c.shape), 1e-3 * start)
-            if (np.abs(c - before) < _DONE * spread)[self.own].all():  # of a dead one the step goes on at the bound
+            worst = float((np.abs(c - before) / spread)[self.own].max())  # of a dead one the step goes on at the bound
+            if worst < _DONE:
                 break
-            if number % _RENEWED == 0:
+            if worst > _FAR and number % _RENEWED == 0:
                 gain, variance = self._gain(self.own, c)
         return c, np.abs(c - before) < spread
 

@@ -22,7 +22,7 @@ from sensorgen.prediction.inference import NORMAL_90
 LEVEL = 0.9
 TAUS_S = (10.0, 30.0, 100.0, 300.0)
 PLAYS = (0.01, 0.03, 0.1)
-_EARNED = 0.03  # share of the error by which a memory or a drift has to lower it: they are of other times than steps
+_EARNED = 0.03  # share of the error by which a memory, a play or a drift has to lower it
 _FRAMES = 4000  # of a session, at most, by which the interval is set
 _QUIET, _PATTERN = 4.0, 4.0  # standard deviations of noise, and of tares over sessions
 _ODD = 0.02  # share of the elements that may be beyond
@@ -197,9 +197,8 @@ def _law(sums: Sequence[elements.Sums], form: elements.LawForm, scale: float) ->
 def chosen(sessions: Sequence[elements.ArraySession]) -> elements.LawForm:
     """Form of the law that leaves the least error in sessions left out.
 
-    Memory in time, which has to lower it by 3 %, and play, which is alike at all speeds, are chosen together: either is
-    taken for the other where it comes first. Then the powers, then a drift of the gain, by 3 % too; of one session a
-    cubic.
+    Memory in time and play are chosen together: either is taken for the other where it comes first. Then the powers,
+    then a drift of the gain. Each term but a power has to lower the error by 3 %. Of one session a cubic.
     """
     best = elements.LawForm()
     if len(sessions) < 2:
@@ -207,7 +206,8 @@ def chosen(sessions: Sequence[elements.ArraySession]) -> elements.LawForm:
     least = float("inf")
     for change in ("past", "powers", "drift"):
         for form in _changed(best, change):
-            cost = _left_out(sessions, form) * (1 + _EARNED * (bool(form.tau_s) + form.drift))
+            terms = bool(form.tau_s) + bool(form.play) + form.drift
+            cost = _left_out(sessions, form) * (1 + _EARNED * terms)
             if cost < least:
                 best, least = form, cost
     return best
@@ -223,7 +223,10 @@ def _changed(base: elements.LawForm, change: str) -> list[elements.LawForm]:
 
 
 def _left_out(sessions: Sequence[elements.ArraySession], form: elements.LawForm) -> float:
-    """Mean over sessions of the median error of an element in a session left out [kPa]; by totals where alone [N]."""
+    """Median error of an element in a session left out [kPa], by totals where alone [N]; geometric mean over sessions.
+
+    So that each session counts by what a form makes of its own error, be that large or small.
+    """
     if len(sessions) < 2:
         return float("inf")
     scale = elements.scale_of(sessions, form)
@@ -232,14 +235,13 @@ def _left_out(sessions: Sequence[elements.ArraySession], form: elements.LawForm)
     for k, own in enumerate(sums):
         law = _law(sums[:k] + sums[k + 1 :], form, scale)
         found.append(_error(own, law))
-    return float(np.mean(found))
+    return float(np.exp(np.mean(np.log(np.maximum(found, 1e-30)))))
 
 
 def _error(own: elements.Sums, law: elements.ElementLaw) -> float:
     at = np.exp(law.drift * (own.day - law.day)) * law.at
     if own.count.any():
-        net = own.gram - own.noise
-        left = own.square - 2 * np.einsum("nq,nq->n", at, own.cross) + np.einsum("nq,nqr,nr->n", at, net, at)
+        left = own.square - 2 * np.einsum("nq,nq->n", at, own.cross) + np.einsum("nq,nqr,nr->n", at, own.gram, at)
         use = law.alive & (own.count > 0)
         return float(np.median(np.sqrt(np.maximum(left[use], 0.0) / own.count[use])))
     return float(np.sqrt(np.mean((own.force - own.total(at * law.alive[:, None])) ** 2)))
@@ -254,8 +256,9 @@ def calibrated(sessions: Sequence[elements.ArraySession], form: "elements.LawFor
 
     form = form or chosen(sessions)
     tares = np.stack([session.tare for session in sessions])
-    quiet = np.median([np.nan_to_num(session.reading[session.unloaded]).std(0) for session in sessions], 0)
+    quiet = _median([session.reading[session.unloaded].std(0) for session in sessions])
     law = law_of(sessions, form)
+    law = replace(law, alive=law.alive & np.isfinite(tares).any(0))  # one that never reads takes no other's law
     several = len(sessions) > 1
     errors = [
         _residuals(session, law_of(training(sessions, k), form) if several else law)
@@ -284,7 +287,7 @@ def _residuals(session: elements.ArraySession, law: elements.ElementLaw) -> tupl
     And sums over frames of the products of two different elements' errors, and of their pressures, (2,) [kPa2]: what
     the first has is alike in all elements.
     """
-    mean, sigma = law.pressures(session)
+    mean, sigma = law.pressures(session, doubt=False)
     size = np.abs(session.pressure_kpa)
     with np.errstate(invalid="ignore"):
         known = (size > elements.UNLOADED * np.nanmax(size, initial=0.0)) & np.isfinite(mean)
@@ -293,6 +296,12 @@ def _residuals(session: elements.ArraySession, law: elements.ElementLaw) -> tupl
     pairs = np.array([_pairs(of) for of in (off, np.where(known, mean, 0.0))])
     known = known[::step]
     return off[::step][known], mean[::step][known], sigma[::step][known], pairs
+
+
+def _median(values: Sequence[Real]) -> Real:
+    """Median of each column's finite values; 0 of none."""
+    columns = (column[np.isfinite(column)] for column in np.stack(values).T)
+    return np.array([float(np.median(column)) if column.size else 0.0 for column in columns])
 
 
 def _pairs(values: Real) -> float:
@@ -349,7 +358,7 @@ class CalibrationStudy:
     def document(self) -> Iterator[Part]:
         """The law, and a row for each session."""
         yield Facts(tuple(self._facts()))
-        yield from (f"{line}: {of.name}" for of in self.sessions for line in _doubts(of))
+        yield from (f"{of.name}: {line}" for of in self.sessions for line in doubts(of))
         if not self.errors:
             yield "one session: its errors in another are not known; expected more, of several days"
             return
@@ -377,26 +386,27 @@ class CalibrationStudy:
         )
         yield "error", f"{own}; all at once {100 * known.common:.2g} %"
         if not law.alive.all():
-            yield "dead", _numbered(~law.alive)
+            yield "dead", _numbered(~law.alive, known.names)
 
 
-def _doubts(of: elements.ArraySession) -> Iterator[str]:
+def doubts(of: elements.ArraySession) -> Iterator[str]:
     """Lines on what of a session may not be as it seems."""
     yield from elements.doubtful_time(of.time_s)
     if of.flickers.any():
-        yield f"doubtful: {_numbered(of.flickers)} flicker, and are left out"
-    if rate := of.falls[0]:
+        yield f"doubtful: left out, as their readings jump: {_numbered(of.flickers, of.names)}"
+    if of.falls:
         yield (
-            f"doubtful: readings at rest fall by {abs(rate):.2g} a second, as after a load; the tare is that to which "
-            "they fall, expected a minute or more without load before"
+            f"doubtful: readings at rest fall by {abs(of.falls):.2g} a second, as after a load on all; the tare is "
+            "that to which they fall"
         )
 
 
-def _numbered(which: Mask) -> str:
-    """Elements, and the first of their numbers."""
-    numbers = np.flatnonzero(which) + 1
-    more = ", ..." if numbers.size > _SHOWN else ""
-    return f"{numbers.size} elements, from 1: {', '.join(map(str, numbers[:_SHOWN].tolist()))}{more}"
+def _numbered(which: Mask, names: Sequence[str]) -> str:
+    """Some elements: how many, and the first of their names, or numbers."""
+    numbers = np.flatnonzero(which)
+    first = [names[k] if names else str(k + 1) for k in numbers[:_SHOWN].tolist()]
+    count = f"{numbers.size} elements" if numbers.size > 1 else "1 element"
+    return f"{count}{'' if names else ', from 1'}: {', '.join(first)}{', ...' if numbers.size > _SHOWN else ''}"
 
 
 def study(sessions: Sequence[elements.ArraySession], *, by_first: bool = False) -> CalibrationStudy:
