@@ -72,7 +72,7 @@ Elements flicker where more than a hundredth of their samples jump to another va
 second, as `calibrate` counts them: the second part is what it gives for files of all samples.
 
 On 15 September, dynamic, readings at rest fall: something lay on the insole before. The tare is that to which they
-fall, in the time of the law's memory, or in 100 s.
+fall; the time in which they do is weighed by the readings, and by what is known before: 100 s, up to a factor of 3.
 
 A state of 100 s was found on these recordings by leaving one out, and so were the way in which a law's terms are
 chosen and the rule for a falling rest: these are not independent of what they are tested on. The law that the others
