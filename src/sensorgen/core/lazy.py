@@ -1,4 +1,4 @@
-"""Sequences: members made when they are used, pairs by_key by key; and what the files of a folder define."""
+"""Sequences whose members are made when they are used, pairs grouped by key; and what the files of a folder define."""
 
 import importlib
 from array import array
