@@ -20,7 +20,7 @@ from sensorgen.prediction.array import elements
 from sensorgen.prediction.inference import NORMAL_90
 
 LEVEL = 0.9
-TAUS_S = (10.0, 30.0, 100.0, 300.0)
+TAUS_S = (10.0, 100.0)  # decades: sessions of minutes do not determine more
 PLAYS = (0.01, 0.03, 0.1)
 _EARNED = 0.03  # share of the error by which a memory or a drift has to lower it: they are of other times than steps
 _FRAMES = 4000  # of a session, at most, by which the interval is set
