@@ -151,6 +151,7 @@ def test_of_two_questions_each_has_to_be_twice_as_sure(shorted, said, tmp_path):
     text = next(text for text in yields.findings(found) if " by film:" in text)
     assert said in text
     assert f"p = {chance:.2g}" in text
+    assert yields.table(found).columns[0].head == "grouped by"
 
 
 def test_r_z_is_not_compared_where_the_electrodes_touch_as_printed(of_thesis, by_hand):

@@ -47,7 +47,7 @@ DIFFER = 0.05 / len(TESTED)  # p value below which one is affirmed: together wro
 class YieldRow:
     """Specimens that have something in common."""
 
-    by: Annotated[str, Column("by_key by")]
+    by: Annotated[str, Column("grouped by")]
     group: Annotated[str, Column("group")]
     specimens: Annotated[int, Column("specimens")]
     open_electrode: Annotated[int, Column("open electrode")]
