@@ -99,6 +99,14 @@ def test_a_plate_between_fixed_sides_as_the_closed_form_has_it():
     assert abs(found.rise_f_per_m2[1] - rise) < found.rise_error_f_per_m2[1] < 0.02 * rise
 
 
+def test_loads_that_are_no_quarter_and_half_of_the_last_are_each_solved():
+    printed = piece(bodies.estimated(make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}}), "arachne"))
+    of = mesh_ladder.Case(printed, "press2d", SOLIDS, EPS, BoundaryConditions())
+    found = estimated(loads=[0.0, 1e3, 2e3, 1e5], of=of).found
+    assert len(found.displacement_m) == 4
+    assert found.displacement_m[2] == pytest.approx(2 * found.displacement_m[1], rel=0.01)
+
+
 def test_loads_between_are_those_of_the_coarser_meshs_curve(monkeypatch):
     """Of a print, in which nothing touches, as if each were solved; of a drawn cell, whose gaps close, each is."""
     solved, loads = [], [0.0, 1e4, 3e4, 6e4, 8e4, 1e5]

@@ -78,7 +78,7 @@ def test_two_pillars_that_bulge_into_each_other_are_one_before_a_mirror(mirrored
 
 @pytest.mark.nightly
 def test_pillars_that_meet_are_stiffer_than_free_ones(mirrored):
-    """Rubber that keeps its volume and has nowhere to go hardly gives way; free pillars do, at half of the first rate.
+    """Rubber that keeps its volume between mirrors is hardly compressed; free pillars are, at half of the first rate.
 
     That is 0.482 on meshes of 0.7 to a third of the usual size.
     """

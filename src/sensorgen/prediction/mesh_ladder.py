@@ -313,14 +313,14 @@ def _smooth(
     None where faces touch, or the curve bends too much for that.
     """
     loads = _few(stress_pa)
-    if len(stress_pa) <= len(loads) or not _may_be_smooth(case, level):
+    if not len(COARSE) == len(loads) < len(stress_pa) or not _may_be_smooth(case, level):
         return None
     coarse = pressed(case, loads, level - 1, keep=keep)
     if coarse.faults or coarse.penetration.any():
         return None
     some = np.divide(loads[1:], loads[-1])
     secants = np.column_stack([coarse.displacement_m, _rise(coarse)[0]])[1:] / some[:, None]
-    (quarter, half, whole), share = secants[-3:], (1 - some[-2]) / (1 - some[-3])
+    (quarter, half, whole), share = secants, (1 - some[1]) / (1 - some[0])
     if np.abs((share * quarter + (1 - share) * whole) / half - 1).max() > _BENT:
         return None
     fine = pressed(case, [0.0, stress_pa[-1]], level, keep=keep, step=step)

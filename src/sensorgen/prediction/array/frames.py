@@ -486,8 +486,8 @@ class MapInverter:
             else:
                 step = gain @ off.ravel() - variance * ((c - start) / self.prior_f**2).ravel()
             before, c = c, np.maximum(c + step.reshape(c.shape), 1e-3 * start)
-            worst = float((np.abs(c - before) / spread)[self.own].max())  # of a dead one the step goes on at the bound
-            if worst < _DONE:
+            worst = float((np.abs(c - before) / spread)[self.own].max(initial=0.0))
+            if worst < _DONE:  # of a dead one the step goes on at the bound
                 break
             if worst > _FAR and number % _RENEWED == 0:
                 gain, variance = self._gain(self.own, c)
