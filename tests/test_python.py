@@ -137,12 +137,22 @@ def test_lists_of_designs():
         lambda: sg.compress(PLATE, []), lambda: sg.compress(PLATE, [-1.0]), lambda: sg.predict(PLATE, force_n=[-5.0]),
         lambda: sg.predict(PLATE, force_n=[2.0, 1.0]), lambda: sg.predict(PLATE, noise=-1.0),
         lambda: sg.predict(PLATE, frequency_hz=0.0), lambda: sg.cell(PLATE, frequency_hz=-1.0),
-        lambda: sg.invert(sg.Design(shape="array"), [1e4], [[1.0]], noise=1e-3),
+        lambda: sg.invert(sg.Design(shape="array"), [1e4], [[1.0]], noise=1e-3), lambda: sg.invert(PLATE, [1e4], [[1.0]]),
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused(asked):
     with pytest.raises(SensorgenError, match="expected"):
         asked()
+
+
+def test_a_softer_specimen_is_within_the_intervals_of_its_design():
+    tones = [1.1e3, 1e5]
+    z = sg.predict(PLATE, frequency_hz=tones, force_n=[0.0, 12.0], position_mm=50).impedance.impedance_ohm[..., 0]
+    pressed, rest = z[:, 1:].T, z[:, :1].T  # of a specimen that gives a third more: by 9 N
+    (low, high), *_ = sg.invert(PLATE, tones, pressed, rest_ohm=rest, noise=1e-5).force_90_n
+    assert low < 9.0 < high
+    (low, high), *_ = sg.invert(PLATE, tones, pressed, noise=1e-5, perfect=True).force_90_n
+    assert 9.0 < low < 12.0 < high
 
 
 def test_a_design_is_pressed_by_its_own_tip():
