@@ -17,10 +17,10 @@ from sensorgen.core.errors import BadInput
 from sensorgen.prediction.calibration.fitting import Posterior, by_rest, pairs, readings, usual_presses
 from sensorgen.prediction.calibration.rest import LOADS_N, STALE_S, Rest, load_probabilities
 from sensorgen.prediction.calibration.specimen import Bench, SpecimenModel, spread_of
-from sensorgen.prediction.inference import NORMAL_90, Index, Samples, cramer_rao, parts, whitening
+from sensorgen.prediction.inference import NORMAL_90, Index, cramer_rao, parts, whitening
 from sensorgen.prediction.inverse.estimator import Prior
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
-from sensorgen.prediction.inverse.verdict import Worded, chi2_limit
+from sensorgen.prediction.inverse.verdict import Presses, Worded, chi2_limit
 from sensorgen.prediction.sensor_model import SensorModel
 
 LEVEL = 0.9  # probability of the intervals
@@ -75,7 +75,7 @@ class Verdict(Worded):
 
 
 @dataclass(frozen=True, eq=False)
-class InvertedPresses(Samples):
+class InvertedPresses(Presses):
     """Presses behind readings.
 
     Attributes
@@ -108,6 +108,10 @@ class InvertedPresses(Samples):
     stretches: Real
     tones: Index
     verdict: NDArray[np.uint8]
+
+    def statuses(self) -> list[str]:
+        """Verdict on each reading, in words."""
+        return Verdict.in_words(self.verdict)
 
 
 class _Readings(NamedTuple):
