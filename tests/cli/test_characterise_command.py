@@ -13,8 +13,9 @@ import virtual_lab
 
 from sensorgen.analysis.characterise import posterior as posteriors
 from sensorgen.analysis.characterise.catalogue import Meters, nominal
-from sensorgen.core.errors import OutOfRange
+from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.workflows.characterise import Study, plan, read
+from sensorgen.workflows.characterise import form as forms
 
 METERS = Meters()
 NAMES = (
@@ -423,3 +424,13 @@ def test_source_with_an_interval_is_as_uncertain_as_that(tmp_path):
 def test_nominal_sizes_have_the_calipers_spread(study):
     sizes = nominal(study.coupons[0], Meters(calipers_mm=0.03))
     assert {s.spread for s in sizes if s.measured} == {0.03}
+
+
+def test_a_form_without_readings_may_be_replaced(planned, tmp_path):
+    form = tmp_path / "form.yaml"
+    blank = (planned.folder / "form.yaml").read_text("utf-8")
+    form.write_text(blank, "utf-8")
+    forms.refuse_filled(form)
+    form.write_text(blank.replace("    vernier_x: ~", "    vernier_x: 1"), "utf-8")
+    with pytest.raises(BadInput, match="has readings, or is damaged"):
+        forms.refuse_filled(form)

@@ -139,7 +139,6 @@ def test_every_pair_gives_the_impedance_back(pair, r, size, sign, frequency_hz):
         ("12.3 / 12.4pF@1kHz", (12.3e-12, 12.4e-12)),
         ("1.2nF / 7 / 9pF@1kHz", (1.2e-9, 7e-12, 9e-12)),
         ("7 ± 1 / 9pF / 1.2nF@1kHz", (7e-9, 9e-12, 1.2e-9)),
-        ("7pF / 9@1kHz", (7e-12, 9.0)),
     ],
 )
 def test_repeats_without_a_unit_have_that_of_the_last(text, farad):
@@ -203,3 +202,25 @@ def test_quantities_of_an_impedance_give_it_back(z):
     for one, other in set(immittance._PAIRS) - {("Y", "phase")}:  # that is the phase of Y
         values = {name: float(immittance.quantity_of(name, z, 2e3)) for name in (one, other)}
         assert immittance.impedance(values, 2e3) == pytest.approx(z, rel=1e-12), (one, other)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "text", "words"),
+    [
+        ("Cp", "12.3@1kHz", "no unit; write it behind the value, as 12.3pF@1kHz"),
+        ("Cp", "7pF / 9@1kHz", "no unit"),
+        ("phase", "-88@1kHz", "no unit; write it behind the value, as -88deg@1kHz"),
+        ("Ls", "3@1kHz", "no unit; write it behind the value, as 3.3mH@1kHz"),
+        ("Z", "9.9e37@1kHz", "9.9e37 is what a meter sends for no value; leave the quantity out"),
+    ],
+)
+def test_values_without_a_unit_or_without_a_value_are_refused(quantity, text, words):
+    with pytest.raises(BadInput) as error:
+        immittance.parse(quantity, text)
+    assert words in str(error.value)
+
+
+def test_picofarads_without_a_unit_are_not_taken_for_farads(read):
+    with pytest.raises(BadInput, match=r"row 2, column Cp: 60.1 F\? Write the unit in the header, as Cp \[pF\]"):
+        read("Frequency,Cp,D\n1000,60.1,0.02\n")
+    assert read("Frequency,Cp [F],D\n1000,60.1,0.02\n").readings[0].value == 60.1

@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from sensorgen.core.files import seal
 from sensorgen.measure.log import Log, Reading
 from sensorgen.measure.log.notes import reading
 
@@ -38,6 +39,7 @@ def test_json_for_programs(run):
         "new": 69,
         "doubtful": 38,
         "corrections": 0,
+        "elsewhere": {},
         "left_out": [],
     }
 
@@ -266,3 +268,16 @@ def test_a_long_list_loads_little(tmp_path):
     assert len(done.stdout.splitlines()) == 45
     loaded = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
     assert not {"numpy", "pydantic", "yaml", "scipy", "build123d", "pyarrow", "sensorgen.design.design"} & loaded
+
+
+def test_a_correction_names_the_reading_and_its_specimen(run):
+    run("add", "23 triX", "--y", "650")
+    assert "corrects reading 1 of 23 triX" in run("add", "23 triY", "--y", "700", "--corrects", "1").words
+
+
+def test_a_print_bed_that_was_changed_by_hand_is_refused(run, tmp_path):
+    (tmp_path / "batch.json").write_text(json.dumps(BATCH | {"sha256": seal(BATCH)}))
+    assert run("import", "batch.json").code == 0
+    (tmp_path / "batch.json").write_text(json.dumps(BATCH | {"batch": "27", "sha256": seal(BATCH)}))
+    said = run("import", "batch.json").line
+    assert "batch.json: it does not hold what was written; see: sensorgen batch verify FOLDER" in said

@@ -148,3 +148,18 @@ def test_any_text_is_read_or_refused(words):
     except BadInput:
         return
     assert all(not math.isnan(ohm) for ohm in found.ohm)
+
+
+@pytest.mark.parametrize("words", [">2k", "> 9.9M", "> banana", ">", ">nothing"])
+def test_a_lower_bound_within_the_range_of_a_meter_is_no_overload(words):
+    with pytest.raises(
+        BadInput, match=r"lower bound; expected what the meter showed, or OL|expected a resistance such"
+    ):
+        parse(words)
+    assert parse(">10M").ohm == (OVERLOAD,)
+
+
+def test_repeats_that_are_far_apart_are_doubted():
+    assert parse("2.3/3.8k").ohm == (2.3, 3800.0)
+    assert "'2.3/3.8k': more than 100 times apart; a k lost?" in parse("2.3/3.8k").doubts
+    assert len(parse("750 / 1.2k / OL").doubts) == 1

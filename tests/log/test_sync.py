@@ -11,7 +11,19 @@ import pytest
 
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log import BenchRun, Log, Prediction, Reading, chain, database, files, listing, sync, verify
+from sensorgen.measure.log import (
+    BenchRun,
+    Log,
+    Prediction,
+    Reading,
+    chain,
+    database,
+    exchange,
+    files,
+    listing,
+    sync,
+    verify,
+)  # fmt: skip
 from sensorgen.measure.log.exchange import thesis_readings
 from sensorgen.measure.log.logbook import withdraw
 from sensorgen.measure.log.notes import reading
@@ -366,3 +378,24 @@ def test_shares_are_told_from_disks(monkeypatch, path, shared):
     found = database.without_locks(Path(path))
     assert found.startswith(shared)
     assert bool(found) == bool(shared)
+
+
+@pytest.mark.parametrize("settled", [True, False])
+def test_an_export_with_the_corrections_of_two_machines_is_imported(machines, tmp_path, settled):
+    a, b, _ = machines
+    (old,) = a.add([reading("23 triX", "0.65")])
+    for log in (a, b):
+        sync.sync(log, tmp_path / "share")
+    for log, ohm in ((a, "650"), (b, "660")):
+        log.add([reading("23 triX", ohm, supersedes=old.uid)])
+    for log in (a, b, a):
+        sync.sync(log, tmp_path / "share")
+    if settled:
+        withdraw(a, "reading", a.readings()[0].number, "typing error")
+    exchange.export(a, tmp_path / "out")
+    for k in range(8):  # what counts does not depend on the chance of an identity
+        with Log(tmp_path / f"{k}.db", create=True) as new:
+            exchange.import_file(new, tmp_path / "out", {})
+            assert [row.uid for row in new.readings()] == [row.uid for row in a.readings()]
+            assert len(new.conflicts()) == (not settled)
+            assert list(verify.faults(new)) == []

@@ -1,5 +1,6 @@
 """Tables that people keep: any names of columns, any separator; and what is no table."""
 
+import math
 import pickle
 import zipfile
 
@@ -8,7 +9,7 @@ import pytest
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.design import specimen_name
 from sensorgen.design.design import Design
-from sensorgen.measure.log import Log, exchange, notes
+from sensorgen.measure.log import Log, exchange, notes, prints
 from sensorgen.measure.log.logbook import withdraw
 
 HEAD = "specimen,y,z,remark\n"
@@ -227,3 +228,56 @@ def test_a_fault_in_the_last_row_logs_none_of_those_before(tmp_path):
             exchange.import_file(log, path, {})
         assert log.head() == (0, "")
         assert exchange.thesis(log).new == 69  # no transaction is left open
+
+
+@pytest.mark.parametrize(
+    ("head", "columns"),
+    [
+        ("Y (kohm);Z [MΩ]", {}),
+        ("Y / kohm;z_Mohm", {}),
+        ("R along (kOhm);R2 (M)", {"y": "R along (kOhm)", "z": "R2 (M)"}),
+    ],
+)
+def test_units_in_the_header_scale_bare_numbers(take, log, head, columns):
+    take(f"Specimen;{head}\n23 triX;1,7 / 2 ;>20\n23 triX;650 ohm;9.9E37\n", **columns)
+    assert [row.y_ohm for row in log.readings()] == [(1700.0, 2000.0), (650.0,)]
+    assert [row.z_ohm for row in log.readings()] == [(math.inf,)] * 2
+
+
+def test_units_of_something_else_in_the_header_are_refused(take, log):
+    with pytest.raises(BadInput, match=r"t.csv, row 1: unit of column 'Y \(V\)'; expected ohm, kohm or Mohm"):
+        take("Specimen,Y (V)\n23 triX,1\n", y="Y (V)")
+    assert take("Specimen,R along (ohm)\n23 triX,650\n", y="R along (ohm)").new == 1
+    assert log.readings()[0].y_words == "650"  # as in logs of before: the same row
+
+
+def test_points_of_thousands_are_doubted_where_commas_are_decimal(take, log):
+    take("Specimen;y;z\n23 triX;1.300;0.650 / 45,1\n")
+    (row,) = log.readings()
+    assert row.y_ohm == (1.3,)
+    assert [doubt for doubt in row.doubts if "thousands" in doubt] == [
+        "1.300: point read as the decimal one; thousands would be 1300 ohm"
+    ]
+    take("Specimen,y,z\n23 triX,1.300,45\n", name="other.csv")
+    assert not any("thousands" in doubt for doubt in log.readings()[1].doubts)
+
+
+def test_a_table_may_name_specimens_that_are_bound_to_a_design(take, log, tmp_path):
+    (tmp_path / "mine.yaml").write_text("shape: reference\nparameters: {length_mm: 60}\n")
+    prints.bind(log, ["F0", "F1"], str(tmp_path / "mine.yaml"))
+    assert take("specimen;y;z\nF0;1,70k;OL\n F1 ;2k;OL\n23 triX;3k;OL\n").new == 3
+    assert [row.specimen for row in log.readings()] == ["F0", "F1", "23 triX"]
+    assert log.readings()[0].design_id == log.bound("F0").design_id
+    with pytest.raises(BadInput, match=r"t.csv, row 2: .*log specimen NAME --design FILE"):
+        take("specimen;y;z\nF2;1,70k;OL\n")
+
+
+def test_rows_that_another_table_had_are_told(take):
+    take(HEAD + "23 triX,650,40,\n23 triY,1k,5,\n", name="monday.csv")
+    done = take(HEAD + "23 triX,650,40,\n23 triY,2k,5,\n", name="friday.csv")
+    assert list(done.document()) == [
+        "1 of 2 rows logged, 1 were there",
+        "1 were there as rows of monday.csv: if they were measured anew, give them a date or a remark",
+    ]
+    again = take(HEAD + "23 triX,650,40,\n23 triY,1k,5,\n", name="monday.csv")
+    assert (again.new, again.elsewhere) == (0, {})

@@ -55,6 +55,7 @@ def _below(xdg: str, usual: str, apple: str) -> Path:
 
 
 MANIFEST = "manifest.json"
+SEAL = "sha256"  # key of a record's own hash
 ELSEWHERE = "; name another place with --out"
 _OURS: set[str] = set()  # parts of this process: an earlier process may have had the same number
 
@@ -253,6 +254,12 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 def hashes(folder: Path) -> dict[str, str]:
     """SHA-256 of every file below a folder, by its name relative to it."""
     return {_key(f, folder): sha256(f.read_bytes()).hexdigest() for f in sorted(_files(folder))}
+
+
+def seal(content: Mapping[str, Any]) -> str:
+    """SHA-256 of a record without its own."""
+    rest = {key: value for key, value in content.items() if key != SEAL}
+    return sha256(json.dumps(rest, sort_keys=True, ensure_ascii=False).encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def _files(folder: Path) -> list[Path]:

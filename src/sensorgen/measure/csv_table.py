@@ -92,6 +92,8 @@ class CsvTable:
     ----------
     names : list of str
         Columns, by sensorgen's names where ``columns`` has them.
+    separator : str
+        Of the columns: ``;``, tab or ``,``.
     truncated : bool
         Whether an incomplete last row was dropped.
     """
@@ -102,7 +104,7 @@ class CsvTable:
         header = self._line()
         if not header.strip():
             raise BadInput(f"{name}: the file is empty; expected a header and rows below it")
-        self._separator = max(";\t,", key=header.count)
+        self.separator = max(";\t,", key=header.count)
         names = [cell.strip() for cell in self._cells(1, header)]
         for given in columns:
             if given not in names:
@@ -138,7 +140,7 @@ class CsvTable:
         empty = True
         while batch := list(self._batch(size)):
             last = batch[-1][1]
-            if truncated and not last.endswith("\n") and last.count(self._separator) < len(self.names) - 1:
+            if truncated and not last.endswith("\n") and last.count(self.separator) < len(self.names) - 1:
                 self.truncated = True
                 batch.pop()
             if filled := [(row, line) for row, line in batch if not line.isspace()]:
@@ -177,7 +179,7 @@ class CsvTable:
         rows, lines = map(list, zip(*batch, strict=True))
         values = self._converted_at_once(lines, numbers)
         if values is not None:  # no quotes: every separator separates, and splitting is faster
-            cells = [line.rstrip("\r\n").split(self._separator) if text else [] for line in lines]
+            cells = [line.rstrip("\r\n").split(self.separator) if text else [] for line in lines]
         else:
             cells = [self._counted(row, self._cells(row, line)) for row, line in zip(rows, lines, strict=True)]
             some = (self._number(row, line, at, dates) for row, line in zip(rows, cells, strict=True) for at in numbers)
@@ -186,18 +188,18 @@ class CsvTable:
 
     def _number(self, row: int, cells: Sequence[str], at: int, dates: Collection[int]) -> float:
         try:
-            return number(cells[at], decimal_comma=self._separator == ";", date=at in dates)
+            return number(cells[at], decimal_comma=self.separator == ";", date=at in dates)
         except BadInput as error:
             raise error.within(f"{self.name}, row {row}, column {self.names[at]}") from None
 
     def _converted_at_once(self, lines: list[str], numbers: Sequence[int]) -> NDArray[np.float64] | None:
         """All numbers of a block, or None where a cell is quoted, empty, no number, or infinite."""
-        if any('"' in line or line.count(self._separator) != len(self.names) - 1 for line in lines):
+        if any('"' in line or line.count(self.separator) != len(self.names) - 1 for line in lines):
             return None
-        if self._separator == ";":
+        if self.separator == ";":
             lines = [line.replace(",", ".") for line in lines]
         try:
-            values = np.loadtxt(lines, delimiter=self._separator, usecols=numbers, comments=None, ndmin=2, dtype=float)
+            values = np.loadtxt(lines, delimiter=self.separator, usecols=numbers, comments=None, ndmin=2, dtype=float)
         except ValueError:
             return None
         return None if np.isinf(values).any() else values
@@ -218,7 +220,7 @@ class CsvTable:
                     raise self.error(begun, f"longer than {_MOST_LINES} lines; close every quotation mark")
                 yield line
 
-        rows = csv.reader(lines(), delimiter=self._separator, strict=True)
+        rows = csv.reader(lines(), delimiter=self.separator, strict=True)
         while True:
             row = begun = self._row + 1
             try:
@@ -232,7 +234,7 @@ class CsvTable:
 
     def _cells(self, row: int, line: str) -> list[str]:
         try:
-            return next(csv.reader([line], delimiter=self._separator, strict=True))
+            return next(csv.reader([line], delimiter=self.separator, strict=True))
         except csv.Error as error:
             raise self._no_csv(row, error) from None
 
@@ -241,7 +243,7 @@ class CsvTable:
         return self.error(row, f"this is no row of a CSV file ({error}); {advice}")
 
     def _counted(self, row: int, cells: list[str]) -> list[str]:
-        if wrong := miscounted(cells, len(self.names), self._separator):
+        if wrong := miscounted(cells, len(self.names), self.separator):
             raise self.error(row, wrong)
         return cells
 

@@ -31,6 +31,7 @@ UNITS: Mapping[str, str] = MappingProxyType({
     "Ls": "H", "Rp": "ohm", "D": "", "Q": "",
 })  # fmt: skip
 QUANTITIES = frozenset(UNITS)
+NO_VALUE = 9.9e37  # SCPI 1999, 7.2.1.4: what an instrument sends for infinity
 NEVER_NEGATIVE = ("R", "Z", "G", "Y", "Cp", "Cs", "Lp", "Ls", "Rp", "D", "Q")  # of a passive specimen
 _EXAMPLES = {"Cp": "12.3pF@1kHz", "Cs": "12.3pF@1kHz", "D": "0.02@1kHz", "phase": "-88deg@1kHz"}
 _SPELLINGS = {
@@ -80,7 +81,7 @@ def parse(quantity: str, text: str) -> tuple[AcReading, ...]:
     Raises
     ------
     BadInput
-        No number, a unit of another quantity, or no frequency.
+        No number, no unit or that of another quantity, no value of a meter, or no frequency.
 
     Examples
     --------
@@ -104,7 +105,12 @@ def parse(quantity: str, text: str) -> tuple[AcReading, ...]:
 
 def _reading(quantity: str, match: Any, last: Any, frequency_hz: float) -> AcReading:
     """A reading of the text; the last one has the unit of those without."""
-    scale = factor(quantity, match["unit"] or last["unit"])
+    unit = match["unit"] or last["unit"]
+    if not unit and UNITS[quantity] in ("F", "H", "rad"):
+        raise BadInput(f"no unit; write it behind the value, as {_EXAMPLES.get(quantity, '3.3mH@1kHz')}")
+    if abs(decimal(match["value"])) >= NO_VALUE:
+        raise BadInput(f"{match['value']} is what a meter sends for no value; leave the quantity out")
+    scale = factor(quantity, unit)
     value, stated = (float(decimal(match[name] or "0") * scale) for name in ("value", "pm"))
     if not math.isfinite(value) or not math.isfinite(stated):
         raise BadInput("more than a number can hold; expected a value as it was read")

@@ -20,7 +20,7 @@ from sensorgen.measure.input_file import checked_head
 
 MOST_BYTES = 16_000_000
 EXPECTED = "a header such as Frequency,Cp,D with numbers below it"
-OVERLOAD = 9.9e37  # SCPI's number for no value
+MOST_BARE_F = 1e-6  # a larger capacitance without a unit is in another one than F
 _HEADER_LINES, _HEAD_BYTES = 200, 100_000  # within which the header stands
 _COMMENTS = ("#", "!", "%", "//", "*")
 _WORDS = yamlfile.read(Path(__file__).with_name("lcr.yaml"))
@@ -153,10 +153,9 @@ def _rows(lines: Sequence[str], header: _Header, first: int, path: Path) -> Iter
 def looks_like(path: Path) -> bool:
     """Test whether a file has the header of an LCR meter's export."""
     try:
-        header = _header(_lines(path, _HEAD_BYTES))
+        return bool(_found(_lines(path, _HEAD_BYTES), path))
     except BadInput:
         return False
-    return header is not None and any(column.quantity == "frequency" for column in header.columns)
 
 
 def _lines(path: Path, most_bytes: int = MOST_BYTES) -> list[str]:
@@ -259,9 +258,11 @@ def _numbers(cells: Sequence[str], columns: Sequence[_Column], where: str) -> It
             message = f"{cell!r:.40} is no number; leave the cell empty where nothing was measured"
             raise BadInput(f"{where}, column {column.head}: {message}")
         value = float(immittance.decimal(match["number"]))
-        if abs(value) < OVERLOAD:
+        if abs(value) < immittance.NO_VALUE:
             with within(f"{where}, column {column.head}"):
                 scale = column.scale_of(match["unit"])
+                if scale is None and column.quantity in ("Cp", "Cs") and abs(value) > MOST_BARE_F:
+                    raise BadInput(f"{value:g} F? Write the unit in the header, as {column.quantity} [pF]")
             yield column, (value * (1.0 if scale is None else scale), scale is not None)
 
 

@@ -290,7 +290,7 @@ def _manifest(design: Design, stage: Path) -> dict[str, Any]:
         "files": store.hashes(stage),
         "versions": versions(),
     }
-    return content | {sealed.SEAL: sealed.seal(_plain(content))}
+    return content | {store.SEAL: store.seal(_plain(content))}
 
 
 def versions() -> dict[str, str]:

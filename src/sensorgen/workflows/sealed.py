@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput
+from sensorgen.core.files import SEAL, seal
 from sensorgen.core.records import shown
 from sensorgen.design.design import Design
 
 if TYPE_CHECKING:
     from sensorgen.measure.log import Log
 
-SEAL = "sha256"  # key of a record's own hash
 STALE = ".stale"  # suffix of G-code of another design
 _WORDS = {"links": "link"}
 
@@ -57,12 +57,6 @@ class Differences:
         """A line for each file that differs."""
         yield from (f"{_WORDS.get(key, key):8} {name}" for key, names in vars(self).items() for name in names)
         yield "differs from its record" if self else "as recorded"
-
-
-def seal(content: Mapping[str, Any]) -> str:
-    """SHA-256 of a record without its own."""
-    rest = {key: value for key, value in content.items() if key != SEAL}
-    return sha256(json.dumps(rest, sort_keys=True, ensure_ascii=False).encode()).hexdigest()
 
 
 def read(path: Path, what: str) -> tuple[dict[str, Any], tuple[str, ...]]:

@@ -11,11 +11,12 @@ import csv
 import io
 import json
 import os
+import re
 import shutil
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from itertools import count
 from operator import attrgetter
@@ -107,12 +108,8 @@ def _write_table(log: Log, kind: type[Entry], path: Path, file_format: str) -> i
         table = list(rows)
         store.replace(path, parquet(kind, table))
         return len(table)
-    count = -1  # the header
     with store.replacing(path) as file:
-        for line in csv_lines(kind, rows):
-            file.write(line.encode())
-            count += 1
-    return count
+        return sum(file.write(line.encode()) > 0 for line in csv_lines(kind, rows)) - 1  # without the header
 
 
 def csv_lines(kind: type[Entry], rows: Iterable[Entry]) -> Iterator[str]:
@@ -220,6 +217,7 @@ def _pyarrow() -> Any:
 MOST_BYTES = 64_000_000
 THESIS = "thesis Table D.1"
 NAMES = yamlfile.read(Path(__file__).with_name("columns.yaml"))
+_UNIT = re.compile(r"(.+?)\s*(?:[\[(]\s*([kmg]?)(?:Ω|ohms?)?\s*[\])]|[/_ ]\s*([kmg]?)(?:Ω|ohms?))$", re.IGNORECASE)
 _TRUTH = {"": None, "yes": True, "true": True, "1": True, "baked": True, "no": False, "false": False, "0": False,
           "unbaked": False, "not baked": False}  # fmt: skip
 
@@ -241,7 +239,9 @@ def opened(path: Path) -> Iterator[CsvTable]:
         yield table
 
 
-def readings(table: CsvTable, columns: Mapping[str, str], source: str) -> tuple[Iterator[Reading], list[str]]:
+def readings(
+    table: CsvTable, columns: Mapping[str, str], source: str, log: Log | None = None
+) -> tuple[Iterator[Reading], list[str]]:
     """Readings of a table as it is read, and the columns that are ignored.
 
     Parameters
@@ -252,29 +252,54 @@ def readings(table: CsvTable, columns: Mapping[str, str], source: str) -> tuple[
         From our columns (``NAMES``) to the table's, where the names are not recognised.
     source : str
         Name of the table in the log.
+    log : Log, optional
+        Where names are bound to designs.
 
     Raises
     ------
     BadInput
-        A cell that cannot be parsed; with file, row and column.
+        A cell that cannot be parsed, or a column in a unit that is none of resistance; with file, row and column.
     """
     places = _places(table, columns)
     left_out = [name for k, name in enumerate(table.names) if k not in set(places.values()) and name]
-    return _rows(table, places, source), left_out
+    return _rows(table, places, source, log), left_out
 
 
-def _rows(table: CsvTable, places: Mapping[str, int], source: str) -> Iterator[Reading]:
+def _rows(table: CsvTable, places: Mapping[str, int], source: str, log: Log | None) -> Iterator[Reading]:
     seen: Counter[str] = Counter()
-    for number, cells in table.text_rows():
-        yield _row(table, number, cells, places, seen, source)
+    bound = {row.specimen for row in log.entries(Print)} if log else set()
+    for number, cells in _cells(table, places):
+        content = json.dumps(list(cells.values()))
+        seen[content] += 1
+        uid = sha256(f"{seen[content]} {content}".encode()).hexdigest()[:32]
+        named = log if " ".join(cells["specimen"].split()) in bound else None  # a query for each would take long
+        yield _row(table, number, cells, source=source, uid=uid, log=named)
     if not seen:
         raise BadInput(f"{table.name}: no rows below the header")
 
 
+def _cells(table: CsvTable, places: Mapping[str, int]) -> Iterator[tuple[int, dict[str, str]]]:
+    """Number of each row and its cells by our columns, with the units in the header."""
+    prefixes = {axis: _prefix(table, places[axis]) for axis in ("y", "z") if axis in places}
+    for number, row in table.text_rows():
+        cells = {ours: row[places[ours]].strip() if ours in places else "" for ours in NAMES}
+        yield number, cells | {axis: notes.with_prefix(cells[axis], prefix) for axis, prefix in prefixes.items()}
+
+
+def _prefix(table: CsvTable, column: int) -> str:
+    """Prefix of the unit in a column's header, as k of ``Y (kohm)``; "" without one."""
+    name = table.names[column]
+    match = _UNIT.fullmatch(name)
+    if match is None and name.endswith((")", "]")):
+        raise table.error(1, f"unit of column {shown(name)}; expected ohm, kohm or Mohm")
+    return match[2] or match[3] or "" if match else ""
+
+
 def _places(table: CsvTable, columns: Mapping[str, str]) -> dict[str, int]:
     """Position of each of our columns in the table."""
-    position = {name.casefold(): k for k, name in enumerate(table.names)}
-    places = {ours: position[name] for ours, names in NAMES.items() for name in reversed(names) if name in position}
+    position = dict(zip(map(str.casefold, table.names), count(), strict=False))
+    plain = {_UNIT.sub(r"\1", name): k for name, k in position.items()} | position
+    places = {ours: plain[name] for ours, names in NAMES.items() for name in reversed(names) if name in plain}
     for ours, theirs in columns.items():
         if ours not in NAMES:
             raise UnknownName("column of --column", ours, NAMES)
@@ -290,20 +315,14 @@ def _places(table: CsvTable, columns: Mapping[str, str]) -> dict[str, int]:
     return places
 
 
-def _row(
-    table: CsvTable, number: int, row: list[str], places: Mapping[str, int], seen: Counter[str], source: str
-) -> Reading:
-    cells = {ours: row[places[ours]].strip() if ours in places else "" for ours in NAMES}
-    content = json.dumps(list(cells.values()))
-    seen[content] += 1
+def _row(table: CsvTable, number: int, cells: Mapping[str, str], **about: Any) -> Reading:
     baked = cells["baked"].casefold()
     try:  # of a hundred thousand rows: a context manager would take longer than they
         if baked not in _TRUTH:
             raise BadInput(f"column baked: {shown(cells['baked'])}; expected yes, no or nothing")
         return reading(
-            cells["specimen"], cells["y"], cells["z"], remark=cells["remark"], baked=_TRUTH[baked], table=True,
-            measured_at=cells["measured_at"], source=source, source_row=number - 1,
-            uid=sha256(f"{seen[content]} {content}".encode()).hexdigest()[:32],
+            cells["specimen"], cells["y"], cells["z"], remark=cells["remark"], baked=_TRUTH[baked],
+            separator=table.separator, measured_at=cells["measured_at"], source_row=number - 1, **about,
         )  # fmt: skip
     except SensorgenError as error:
         raise error.within(f"{table.name}, row {number}") from None
@@ -405,6 +424,8 @@ class ImportedRecording:
         New readings with doubts.
     corrections : int
         New rows that correct one that was logged before the table was edited.
+    elsewhere : dict of str to int
+        Number of rows that the log has of each other table.
     left_out : tuple of str
         Columns that were ignored.
     """
@@ -413,6 +434,7 @@ class ImportedRecording:
     new: int
     doubtful: int
     corrections: int = 0
+    elsewhere: dict[str, int] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
 
     def document(self) -> Iterator[Part]:
@@ -422,6 +444,8 @@ class ImportedRecording:
         edited = f"{self.corrections} correct what was logged before the table was edited" if self.corrections else ""
         rows = ", ".join(filter(None, (f"{self.new} of {self.rows} rows logged", known, doubtful, edited)))
         yield rows
+        for table, equal in self.elsewhere.items():
+            yield f"{equal} were there as rows of {table}: if they were measured anew, give them a date or a remark"
         if self.left_out:
             yield f"columns left out: {', '.join(self.left_out)}"
 
@@ -528,7 +552,7 @@ def _table(log: Log, path: Path, columns: Mapping[str, str]) -> Iterator[tuple[I
         if kind := kind_of(table.names):
             yield from_csv(kind, table), ()
         else:
-            rows, left_out = readings(table, columns, path.name)
+            rows, left_out = readings(table, columns, path.name, log)
             yield corrections(log, rows, path.name), left_out
 
 
@@ -547,4 +571,5 @@ def _add(log: Log, rows: Iterable[Entry], left_out: Iterable[str] = ()) -> Impor
         new += 1
         doubtful += isinstance(row, Reading) and bool(row.doubts)
         corrections += bool(getattr(row, "supersedes", "")) and not row.claimed_at  # of no export
-    return ImportedRecording(next(numbers), new, doubtful, corrections, tuple(left_out))
+    elsewhere = {there: n for (there, here), n in log.passed_over.items() if there != here}
+    return ImportedRecording(next(numbers), new, doubtful, corrections, elsewhere, tuple(left_out))

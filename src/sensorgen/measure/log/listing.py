@@ -11,7 +11,7 @@ from sensorgen.core.document import Cell, Column, Facts, Part, Table
 from sensorgen.core.units import frequency_text, si
 from sensorgen.measure.immittance import shown_value
 from sensorgen.measure.log import bench
-from sensorgen.measure.log.entries import BenchRun, Entry, Prediction, Print, Reading, Withdrawal
+from sensorgen.measure.log.entries import BenchRun, Entry, Prediction, Print, Reading, Withdrawal, word
 from sensorgen.measure.log.logbook import Log, conflict
 
 _REMARK = 20  # letters of a remark in a list
@@ -187,7 +187,7 @@ def _near(entry: Entry, log: Log) -> Iterator[tuple[str, str]]:
 def _corrections(entry: Entry, log: Log) -> Iterator[tuple[str, str]]:
     if isinstance(entry, Reading | BenchRun) and entry.supersedes:
         for old in log.entries(type(entry), superseded=True, uid=entry.supersedes):
-            yield "corrects", f"row {old.number}"
+            yield "corrects", f"{word(type(old))} {old.number} of {old.specimen}"
     for new in log.superseding(entry):
         yield ("withdrawn", new.reason) if isinstance(new, Withdrawal) else ("corrected", f"by row {new.number}")
     if rival := log.rival(entry):

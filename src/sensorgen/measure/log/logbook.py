@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 import uuid
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from datetime import UTC, datetime
@@ -49,9 +50,10 @@ _FIELDS = "id, parents, kind, version, logged_at, content"
 # of the kind that is the first value: withdrawn rows; a correction that counts in place of another one of the same row,
 # as two machines may make them, by an order that all machines share; and all that is corrected, withdrawn or lost so
 _WITHDRAWN = "SELECT supersedes FROM record WHERE kind = 'withdrawal' AND json_extract(content, '$.of') = ?1"
+_TIME = "ifnull(nullif(json_extract({0}.content, '$.claimed_at'), ''), {0}.logged_at)"  # also of imported rows
 _PREFERRED = (
     "other.supersedes = row.supersedes AND +other.kind = ?1 AND other.number IS NOT NULL AND "
-    f"(other.logged_at, other.id) > (row.logged_at, row.id) AND other.uid NOT IN ({_WITHDRAWN})"
+    f"({_TIME.format('other')}, other.id) > ({_TIME.format('row')}, row.id) AND other.uid NOT IN ({_WITHDRAWN})"
 )
 _SUPERSEDED = (
     "SELECT supersedes FROM record WHERE supersedes IS NOT NULL AND (+kind = ?1 "  # noqa: S608
@@ -82,6 +84,11 @@ class Log(AbstractContextManager["Log", None]):
     create : bool
         Whether to create a missing file.
 
+    Attributes
+    ----------
+    passed_over : Counter
+        Number of rows of the latest :meth:`add` that were there, by the source there and their own.
+
     Examples
     --------
     >>> import tempfile
@@ -95,6 +102,7 @@ class Log(AbstractContextManager["Log", None]):
     def __init__(self, path: Path, *, create: bool = False) -> None:
         self.path = path = Path(path)
         self._connection = database.connect(path, create=create)
+        self.passed_over: Counter[tuple[str, str]] = Counter()
         self._printed: dict[str, dict[str, Any]] = {}  # batch and design of the latest print, while rows are added
 
     def __exit__(self, *_: object) -> None:
@@ -339,6 +347,7 @@ class Log(AbstractContextManager["Log", None]):
         with database.transaction(self._connection, self.path):
             writer = Appender(self._connection, *self.head())
             self._printed.clear()
+            self.passed_over.clear()
             for entry in entries:
                 if added := self._add(entry, now, writer):
                     yield added
@@ -393,6 +402,7 @@ class Log(AbstractContextManager["Log", None]):
             known = next(self.entries(kind, superseded=True, uid=entry.uid))
             if entry.logged_at and not _same(known, entry, but=("number", "logged_at", "claimed_at")):
                 raise BadInput(f"row {entry.uid} has other content in the log; expected the same")
+            self.passed_over[getattr(known, "source", ""), getattr(entry, "source", "")] += 1
             return None
         self._check(entry)
         if isinstance(entry, Reading | BenchRun) and not (entry.batch or entry.logged_at):
@@ -429,6 +439,8 @@ class Log(AbstractContextManager["Log", None]):
         old = next(self.entries(kind, superseded=True, uid=uid), None)
         if old is None:
             raise BadInput(f"nothing to correct: no row {uid!r} in the log")
+        if entry.logged_at:  # of an export, with what two machines corrected
+            return
         later = next(iter(self.superseding(old)), None)
         if later:
             how = "withdrawn" if isinstance(later, Withdrawal) else "corrected"
@@ -448,7 +460,8 @@ class Log(AbstractContextManager["Log", None]):
         """Correction by another machine of the row that this row corrects, which counts in its place."""
         sql = (
             "SELECT other.kind, other.content, other.number, other.logged_at FROM record row, record other "  # noqa: S608
-            f"WHERE row.kind = ?1 AND row.number = ?2 AND {_PREFERRED} ORDER BY other.logged_at DESC, other.id DESC"
+            f"WHERE row.kind = ?1 AND row.number = ?2 AND {_PREFERRED} "
+            f"ORDER BY {_TIME.format('other')} DESC, other.id DESC"
         )
         row = next(self._rows(sql, [NAMES[type(entry)], entry.number]), None)
         return self._row(*row) if row else None

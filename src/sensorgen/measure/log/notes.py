@@ -16,22 +16,27 @@ from sensorgen.core.units import frequency_text
 from sensorgen.design import specimen_name
 from sensorgen.design.design import Design
 from sensorgen.measure import immittance
-from sensorgen.measure.immittance import NUMBER, decimal
+from sensorgen.measure.immittance import NO_VALUE, NUMBER, decimal
 from sensorgen.measure.log.entries import SPECIMEN_COLUMNS, Print, Reading, Specimen
 from sensorgen.measure.log.logbook import Log
 
 OVERLOAD = math.inf  # beyond the meter's range [ohm]
-SCPI_OVERLOAD_OHM = 9.9e37  # SCPI 1999, 7.2.1.4: what an instrument sends for infinity
+RANGE_OHM = 10e6  # that every multimeter reads; a lower bound from here on is an overload
 MOST_OHM = 1e16  # no meter reads more
 LEADS_OHM = 1.0  # typical resistance of leads and contacts
+MOST_RATIO = 100  # of readings of one specimen
 MAX_CHARACTERS = 200
 EXPECTED = "a resistance such as 650, 0.65k, 2.3k / 3.8k, 1.2M or OL"
 
-_NUMBER = re.compile(rf"(?P<number>{NUMBER})\s*(?P<prefix>meg|[kmg])?\s*(?:Ω|ω|ohms?|r)?", re.IGNORECASE)
+_NUMBER = re.compile(
+    rf"(?P<above>>\s*)?(?P<number>{NUMBER})\s*(?P<prefix>meg|[kmg])?\s*(?:Ω|ω|ohms?|r)?", re.IGNORECASE
+)
 _LETTER_AS_POINT = re.compile(r"([0-9]+)([kKMGR])([0-9]+)")  # IEC 60062: 4k7
-_OVERLOAD = re.compile(r"\+?(o\.?l\.?|0\.?l|ovld|ovrld|overload|over ?range|inf(inity)?|∞|open)|>.*", re.IGNORECASE)
+_OVERLOAD = re.compile(r"\+?(o\.?l\.?|0\.?l|ovld|ovrld|overload|over ?range|inf(inity)?|∞|open)", re.IGNORECASE)
 _NO_READING = re.compile(r"[-–—]*|n\.?/?a\.?|nan|none|\?+", re.IGNORECASE)
 _THOUSANDS = re.compile(r"[-+]?[0-9]{1,3},[0-9]{3}")
+_POINTS = re.compile(r"(?:^|[/|])\s*([1-9][0-9]{0,2}\.[0-9]{3})\s*(?=$|[/|])")  # in a table with decimal commas
+_BARE = re.compile(rf"((?:^|[/;|])\s*>?\s*{NUMBER})\s*(?=$|[/;|])")
 _SIGNS = str.maketrans({"\u2126": "Ω", "\u2212": "-"})  # the ohm sign apart from omega, the true minus sign
 _FACTOR = {"": "1", "k": "1e3", "m": "1e6", "meg": "1e6", "g": "1e9"}
 
@@ -87,6 +92,9 @@ def parse(text: str, *, mega: bool = False) -> Resistances:
     parts = [_parsed(part.strip(), text, mega=mega) for part in re.split("[/;|]", stripped)]
     ohm, doubts, small_m = zip(*parts, strict=True)
     repeats = [f"{len(ohm)} readings: repeats, or several points of contact"] if len(ohm) > 1 else []
+    finite = sorted(value for value in ohm if 0 < value < OVERLOAD)
+    if finite and finite[-1] > MOST_RATIO * finite[0]:
+        repeats.append(f"{shown(stripped)}: more than {MOST_RATIO} times apart; a k lost?")
     return Resistances(ohm, tuple(dict.fromkeys(chain(*doubts, repeats))), tuple(filter(None, small_m)))
 
 
@@ -105,18 +113,23 @@ def _parsed(part: str, text: str, *, mega: bool) -> tuple[float, Sequence[str], 
 
 def _ohm(match: re.Match[str], text: str) -> float:
     """The number, rounded once [ohm]."""
-    ohm = float(decimal(match["number"]) * Decimal(_FACTOR[(match["prefix"] or "").lower()]))
-    if math.isclose(ohm, SCPI_OVERLOAD_OHM):
+    number = decimal(match["number"])
+    if math.isclose(number, NO_VALUE):
         return OVERLOAD
+    ohm = float(number * Decimal(_FACTOR[(match["prefix"] or "").lower()]))
     if abs(ohm) > MOST_OHM:
         raise BadInput(f"{shown(text)}: {ohm:g} ohm is more than any meter reads; expected {EXPECTED}")
-    return ohm
+    if match["above"] and ohm < RANGE_OHM:
+        raise BadInput(f"{shown(text)}: a lower bound; expected what the meter showed, or OL beyond its range")
+    return OVERLOAD if match["above"] else ohm
 
 
 def _doubts(part: str, prefix: str, ohm: float) -> Iterator[str]:
     written = shown(part)
     if prefix == "m":
         yield f"{written}: m read as mega (milli would be below the contact resistance)"
+    if part.startswith(">"):
+        yield f"{written} taken for overload"
     if prefix == "K":
         yield f"{written}: upper-case K read as kilo"
     if _THOUSANDS.fullmatch(part):
@@ -165,7 +178,7 @@ def _bound(written: str, log: Log | None) -> Print | None:
 def reading(
     written: str, y_words: str = "", z_words: str = "", *, remark: str = "", baked: bool | None = None,
     measured_at: str = "", instrument: str = "", source: str = "typed", source_row: int | None = None,
-    supersedes: str = "", uid: str = "", table: bool = False, mega: bool = False, log: Log | None = None,
+    supersedes: str = "", uid: str = "", separator: str = "", mega: bool = False, log: Log | None = None,
 ) -> Reading:  # fmt: skip
     """Reading of the multimeter, from text.
 
@@ -183,8 +196,9 @@ def reading(
         As in :class:`Reading`.
     uid : str
         Identity of the row; random if not given.
-    table : bool
-        Whether the text comes from a table, where a blank beside a reading may be an overload.
+    separator : str
+        Separator of the table that the text comes from, where a blank beside a reading may be an overload, and with ";"
+        a point that of thousands; "" if it comes from none.
     mega : bool
         Whether a small m is known to mean mega, so that it raises no doubt.
     log : Log, optional
@@ -209,7 +223,7 @@ def reading(
     y, z = resistance("y", y_words, mega=mega), resistance("z", z_words, mega=mega)
     doubts = [] if _bound(written, log) else _assumed(written, of)
     doubts += [f"{axis}: {doubt}" for axis, parsed in (("y", y), ("z", z)) for doubt in parsed.doubts]
-    doubts += _blanks(y, z) if table else []
+    doubts += [*_blanks(y, z), *_points(separator, f"{y_words}/{z_words}")] if separator else []
     if _UNBAKED.search(remark):
         doubts += ["baked, but the remark says that it is not"] if baked else []
         baked = bool(baked)
@@ -226,6 +240,12 @@ def _blanks(y: Resistances, z: Resistances) -> list[str]:
     if not (y.ohm or z.ohm):
         return ["no measurement"]
     return [] if y.ohm and z.ohm else [f"{'z' if y.ohm else 'y'} blank: not measured, or an overload"]
+
+
+def _points(separator: str, words: str) -> list[str]:
+    """Doubts about numbers such as 1.300 in a table with decimal commas."""
+    numbers = _POINTS.findall(words) if separator == ";" else []
+    return [f"{n}: point read as the decimal one; thousands would be {n.replace('.', '')} ohm" for n in numbers]
 
 
 def _assumed(written: str, of: Specimen) -> list[str]:
@@ -276,6 +296,15 @@ def implausible(every: Iterable[immittance.AcReading]) -> tuple[str, ...]:
         for one in every
         if one.value < 0 and one.quantity in immittance.NEVER_NEGATIVE
     )
+
+
+def with_prefix(text: str, prefix: str) -> str:
+    """Text of a cell, its numbers with the prefix of their column where they have no unit of their own.
+
+    >>> with_prefix("2.3 / 3.8M", "k"), with_prefix("OL", "k")
+    ('2.3k/ 3.8M', 'OL')
+    """
+    return _BARE.sub(rf"\1{prefix}", text) if prefix else text
 
 
 def resistance(axis: str, text: str, *, mega: bool = False) -> Resistances:

@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import Field
 
+from sensorgen.core import files as store
 from sensorgen.core.errors import BadInput, MissingValue, NotTrusted, SensorgenError, within
 from sensorgen.core.records import Strict, checked, shown
 from sensorgen.core.version import __version__
@@ -69,11 +70,13 @@ def rows(path: Path, file: RawFile) -> Iterator[Entry]:
     Raises
     ------
     BadInput
-        Not the record of a batch; with the file's name, and the key.
+        Not the record of a batch, or one that was changed; with the file's name, and the key.
     """
     data = _json(path)
     with within(str(path)):
         record = checked(_Record, data)
+        if data.get(store.SEAL, "") not in ("", store.seal(data)):
+            raise BadInput("it does not hold what was written; see: sensorgen batch verify FOLDER")
         yield file
         yield Batch(uid=file.uid, batch=record.batch or path.absolute().parent.name, file=file.uid)
         for key, design in record.designs.items():

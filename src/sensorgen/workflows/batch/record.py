@@ -9,6 +9,7 @@ from sensorgen.checks.volumes import LayerVolume
 from sensorgen.core.display import Boundless
 from sensorgen.core.document import Column, Part, Table, to_json
 from sensorgen.core.errors import MissingValue
+from sensorgen.core.files import seal
 from sensorgen.core.findings import Finding
 from sensorgen.core.units import si
 from sensorgen.design import materials
@@ -16,7 +17,6 @@ from sensorgen.export.gcode.results import Checked
 from sensorgen.prediction.results import Prediction
 from sensorgen.workflows.batch.layout import Plate, Rect
 from sensorgen.workflows.batch.plan import Bake, BatchPlan, Filament, Layout, PrintPiece
-from sensorgen.workflows.sealed import seal
 
 RECORD = "batch.json"
 _COLUMNS = (

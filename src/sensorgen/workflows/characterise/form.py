@@ -156,7 +156,8 @@ def refuse_filled(path: Path) -> None:
     if not path.exists():
         return
     try:
-        full = any(value is not None for fields in read(path).coupons.values() for value in fields.values())
+        coupons = read(path).coupons.values()  # a blank form has loads
+        full = any(v is not None for fields in coupons for key, v in fields.items() if not key.endswith("_load_n"))
     except SensorgenError:
         full = True
     if full:
