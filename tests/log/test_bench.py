@@ -196,7 +196,7 @@ def test_the_command_and_the_way_out_and_in_again(run, path, run_files, tmp_path
         assert len(log.recordings(superseded=True)) == 2
     assert json.loads(run("show", "26 triX .1mm", "--json").out)[0]["remark"] == "x"
     again = run("bench", "26 triX .1mm 2", *run_files, "--corrects", "2", "--remark", "y").out  # or its words alone
-    assert "corrects   row 2" in again
+    assert "corrects   recording 2 of 26 triX .1mm 2" in again
     assert "corrected  by row 3" in run("show", "26 triX .1mm 2").out
     assert "has this very recording" in run("bench", "26 triX .1mm 2", *run_files, "--corrects", "2").out
     assert run("export", "out").code == 0

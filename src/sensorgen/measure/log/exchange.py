@@ -280,7 +280,7 @@ def _rows(table: CsvTable, places: Mapping[str, int], source: str, log: Log | No
 
 def _cells(table: CsvTable, places: Mapping[str, int]) -> Iterator[tuple[int, dict[str, str]]]:
     """Number of each row and its cells by our columns, with the units in the header."""
-    prefixes = {axis: _prefix(table, places[axis]) for axis in ("y", "z") if axis in places}
+    prefixes = {axis: prefix for axis in ("y", "z") if axis in places and (prefix := _prefix(table, places[axis]))}
     for number, row in table.text_rows():
         cells = {ours: row[places[ours]].strip() if ours in places else "" for ours in NAMES}
         yield number, cells | {axis: notes.with_prefix(cells[axis], prefix) for axis, prefix in prefixes.items()}

@@ -28,9 +28,7 @@ MOST_RATIO = 100  # of readings of one specimen
 MAX_CHARACTERS = 200
 EXPECTED = "a resistance such as 650, 0.65k, 2.3k / 3.8k, 1.2M or OL"
 
-_NUMBER = re.compile(
-    rf"(?P<above>>\s*)?(?P<number>{NUMBER})\s*(?P<prefix>meg|[kmg])?\s*(?:Ω|ω|ohms?|r)?", re.IGNORECASE
-)
+_NUMBER = re.compile(rf"(?P<above>>)?\s*(?P<number>{NUMBER})\s*(?P<prefix>meg|[kmg])?\s*(Ω|ohms?|r)?", re.IGNORECASE)
 _LETTER_AS_POINT = re.compile(r"([0-9]+)([kKMGR])([0-9]+)")  # IEC 60062: 4k7
 _OVERLOAD = re.compile(r"\+?(o\.?l\.?|0\.?l|ovld|ovrld|overload|over ?range|inf(inity)?|∞|open)", re.IGNORECASE)
 _NO_READING = re.compile(r"[-–—]*|n\.?/?a\.?|nan|none|\?+", re.IGNORECASE)
@@ -92,7 +90,7 @@ def parse(text: str, *, mega: bool = False) -> Resistances:
     parts = [_parsed(part.strip(), text, mega=mega) for part in re.split("[/;|]", stripped)]
     ohm, doubts, small_m = zip(*parts, strict=True)
     repeats = [f"{len(ohm)} readings: repeats, or several points of contact"] if len(ohm) > 1 else []
-    finite = sorted(value for value in ohm if 0 < value < OVERLOAD)
+    finite = sorted({*map(abs, ohm)} - {0.0, OVERLOAD})
     if finite and finite[-1] > MOST_RATIO * finite[0]:
         repeats.append(f"{shown(stripped)}: more than {MOST_RATIO} times apart; a k lost?")
     return Resistances(ohm, tuple(dict.fromkeys(chain(*doubts, repeats))), tuple(filter(None, small_m)))
@@ -304,7 +302,7 @@ def with_prefix(text: str, prefix: str) -> str:
     >>> with_prefix("2.3 / 3.8M", "k"), with_prefix("OL", "k")
     ('2.3k/ 3.8M', 'OL')
     """
-    return _BARE.sub(rf"\1{prefix}", text) if prefix else text
+    return _BARE.sub(rf"\1{prefix}", text)
 
 
 def resistance(axis: str, text: str, *, mega: bool = False) -> Resistances:
