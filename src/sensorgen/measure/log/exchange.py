@@ -291,7 +291,7 @@ def _prefix(table: CsvTable, column: int) -> str:
     name = table.names[column]
     match = _UNIT.fullmatch(name)
     if match is None and name.endswith((")", "]")):
-        raise table.error(1, f"unit of column {shown(name)}; expected ohm, kohm or Mohm")
+        raise table.error(1, f"unit of column {shown(name)}; expected ohm, kohm or Mohm, or a name without brackets")
     return match[2] or match[3] or "" if match else ""
 
 
@@ -442,8 +442,7 @@ class ImportedRecording:
         known = f"{self.rows - self.new} were there" if self.new < self.rows else ""
         doubtful = f"{self.doubtful} with doubts" if self.doubtful else ""
         edited = f"{self.corrections} correct what was logged before the table was edited" if self.corrections else ""
-        rows = ", ".join(filter(None, (f"{self.new} of {self.rows} rows logged", known, doubtful, edited)))
-        yield rows
+        yield ", ".join(filter(None, (f"{self.new} of {self.rows} rows logged", known, doubtful, edited)))
         for table, equal in self.elsewhere.items():
             yield f"{equal} were there as rows of {table}: if they were measured anew, give them a date or a remark"
         if self.left_out:
