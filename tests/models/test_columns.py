@@ -3,20 +3,18 @@
 Unless noted: default sizes, X60 4.68, air 1.00059; see models-cells.md.
 """
 
-import json
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
-from cell_scenes import stairs
+from cell_scenes import CELLS, EPS, MM, close, rect_cell, stairs, tri_cell
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from sensorgen.core.units import EPS0_F_PER_M
-from sensorgen.design.shapes import rect, reference, tri
+from sensorgen.design.shapes import rect, tri
 from sensorgen.models import fem2d
 from sensorgen.models.columns import _mean_min, capacitance, why_not_applicable
 from sensorgen.scene.repetition import cell
@@ -24,24 +22,6 @@ from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 from sensorgen.scene.sections import sections
 from sensorgen.solvers.electrostatics.triangles import energy as straight
 from sensorgen.solvers.electrostatics.triangles import triangles
-
-EPS = {"x60": 4.68, "air": 1.00059}
-CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
-MM = 1e-3
-
-
-def close(expected, rel: float):
-    """Relative only: pytest's absolute tolerance of 1e-12 is more than many a capacitance."""
-    return pytest.approx(expected, rel=rel, abs=0)
-
-
-def tri_cell(film_mm: float, **options) -> Scene:
-    """One period, 1 mm deep."""
-    return tri.scene(tri.Params(length_mm=2.0, width_mm=1.0, dielectric_mm=film_mm, **options), Fill())
-
-
-def rect_cell(film_mm: float, **options) -> Scene:
-    return rect.scene(rect.Params(length_mm=2.0, width_mm=2.0, dielectric_mm=film_mm, **options), Fill())
 
 
 def tri_bounds(film_mm: float, eps=EPS, **options) -> tuple[float, float]:
@@ -66,17 +46,6 @@ def test_rect_lies_between_its_bounds(case):
     assert case["C_F"] * (1 + off) < found.upper
 
 
-def test_the_bounds_are_as_far_off_as_the_spec_says():
-    """Table of models-cells.md, d = 0.1: tri -25.2 and +22.5 %, rect -14.3 and (film only) +104 %."""
-    exact_tri, exact_rect = CELLS["tri"][0]["C_F_per_m"], CELLS["rect"][0]["C_F"]
-    lower, upper = tri_bounds(0.1)
-    assert 100 * (lower / exact_tri - 1) == pytest.approx(-25.2, abs=0.05)
-    assert 100 * (upper / exact_tri - 1) == pytest.approx(22.5, abs=0.05)
-    found = capacitance(rect_cell(0.1), EPS)
-    assert 100 * (found.lower / exact_rect - 1) == pytest.approx(-14.3, abs=0.05)
-    assert 100 * (found.upper / exact_rect - 1) == pytest.approx(104, abs=0.5)
-
-
 @pytest.mark.parametrize(("length", "width"), [(100.0, 10.0), (10.0, 100.0), (6.0, 2.0)])
 @pytest.mark.parametrize("along", ["xy", "yx"])
 def test_many_cells_are_that_many_times_one(length, width, along):
@@ -86,7 +55,9 @@ def test_many_cells_are_that_many_times_one(length, width, along):
     cells = length * width / 4
     assert found.lower == close(cells * one.lower, 1e-12)
     assert found.upper == close(cells * one.upper, 1e-12)
-    assert 100 * (found.lower / cells / CELLS["rect"][0]["C_F"] - 1) == pytest.approx(-14.3, abs=0.05)
+    exact = cells * CELLS["rect"][0]["C_F"]  # the thesis's sum of columns, and the film alone: docs/cells.md
+    assert 100 * (found.lower / exact - 1) == pytest.approx(-14.3, abs=0.05)
+    assert 100 * (found.upper / exact - 1) == pytest.approx(104, abs=0.5)
 
 
 @pytest.mark.parametrize("along", ["x", "y"])
@@ -95,12 +66,6 @@ def test_the_bounds_of_tri_are_those_of_its_periods(along):
     found = capacitance(tri.scene(tri.Params(**size, dielectric_mm=0.1, along=along), Fill()), EPS)
     one = tri_bounds(0.1)
     assert (found.lower, found.upper) == close(tuple(7 * 3 * MM * bound for bound in one), 1e-12)
-
-
-def test_the_plate_is_exact():
-    found = capacitance(reference.scene(reference.Params(length_mm=2.0, width_mm=2.0), Fill()), EPS)
-    exact = CELLS["plate"]["C_F_per_m2"] * (2 * MM) ** 2
-    assert (found.lower, found.upper) == close((exact, exact), 1e-12)
 
 
 def test_plates_in_series_are_exact():
@@ -172,12 +137,6 @@ def test_a_ridge_of_the_same_permittivity_as_the_air_leaves_a_plate():
     found = capacitance(plates(RIDGE), {"x60": 4.68, "air": 4.68})
     exact = EPS0_F_PER_M * 4.68 * 4 * 2 / 0.7 * MM
     assert (found.lower, found.upper) == close((exact, exact), 1e-12)
-
-
-def test_a_ridge_in_air_lies_between_two_plates():
-    found = capacitance(plates(RIDGE), EPS)
-    air, full = (EPS0_F_PER_M * eps * 4 * 2 / 0.7 * MM for eps in (EPS["air"], EPS["x60"]))
-    assert air < found.lower < found.upper < full
 
 
 def reduced_mm(u: float, film: float, hang: float, lower: float, cog: bool, eps=EPS, quarter: float = 0.5) -> float:
@@ -349,15 +308,6 @@ def test_all_permittivities_times_k_is_k_times_the_capacitance():
     assert b == close(tuple(3 * x for x in a), 1e-12)
 
 
-@pytest.mark.parametrize("shape", [tri, rect])
-def test_direction_does_not_matter(shape):
-    a, b = {tri: ("x", "y"), rect: ("xy", "yx")}[shape]
-    along = [
-        capacitance(shape.scene(shape.Params(length_mm=6.0, width_mm=6.0, along=way), Fill()), EPS) for way in (a, b)
-    ]
-    assert (along[0].lower, along[0].upper) == close((along[1].lower, along[1].upper), 1e-12)
-
-
 def test_a_film_named_apart_is_the_same_film():
     scene = tri.scene(tri.Params(length_mm=2.0, width_mm=1.0, dielectric_mm=0.1), Fill(film="pla"))
     found = capacitance(scene, EPS | {"pla": 4.68})
@@ -402,8 +352,3 @@ def test_it_says_what_it_cannot_speak_of(scene, reason):
 @pytest.mark.parametrize("scene", [tri_cell(0.1), rect_cell(0.1), tri_cell(1e-6), plates(RIDGE), plates()])
 def test_it_speaks_of_the_rest(scene):
     assert why_not_applicable(scene) is None
-
-
-def test_a_material_without_permittivity_is_missing():
-    with pytest.raises(KeyError):
-        capacitance(tri_cell(0.1), {"air": 1.0})

@@ -1,14 +1,12 @@
 """Boxes between two bounds: references, the cross-section's elements, limits, symmetries, the solver by itself."""
 
-import json
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from cell_scenes import EPS, MM, cut_slabs, plates, rect_cell, stairs, tri_cell
+from cell_scenes import CELLS, EPS, MM, close, cut_slabs, plates, rect_cell, stairs, tri_cell
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
@@ -17,14 +15,8 @@ from sensorgen.design.shapes import rect
 from sensorgen.models import columns, fem3d
 from sensorgen.scene.scene import Body, Fill, Scene, box
 from sensorgen.solvers.electrostatics.bounds import FieldStep
-from sensorgen.solvers.electrostatics.boxes import Pair, boxes_of, flux, grid, layered, potential, whole
+from sensorgen.solvers.electrostatics.boxes import Pair, grid, layered, whole
 from sensorgen.solvers.electrostatics.elimination import HELD
-
-CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
-
-
-def close(expected: float, rel: float):
-    return pytest.approx(expected, rel=rel, abs=0)
 
 
 @pytest.fixture(scope="module")
@@ -82,11 +74,6 @@ def test_turned_swapped_and_scaled(rungs):
     many = next(fem3d.steps(rect.scene(rect.Params(length_mm=12.0, width_mm=4.0), Fill()), EPS)).interval
     for other, factor in ((turned, 1), (swapped, 1), (many, 12)):
         assert (other.lower, other.upper) == close((one.lower * factor, one.upper * factor), 1e-9)
-
-
-def test_doubled_permittivities_double_it():
-    one, two = (next(fem3d.steps(rect_cell(0.2), {m: f * e for m, e in EPS.items()})).interval for f in (1, 2))
-    assert (two.lower, two.upper) == close((2 * one.lower, 2 * one.upper), 1e-9)
 
 
 def test_an_isolation_above_the_electrode_changes_nothing():
@@ -301,57 +288,6 @@ def test_what_both_fields_cannot_make_is_the_difference_of_their_energies():
     assert unmet == close(dual - primal, 1e-6)
     assert 0 < unmet < 0.2 * dual
     assert energy > 0
-
-
-@pytest.mark.parametrize("order", [1, 2, 4])
-@pytest.mark.parametrize("kind", [potential, flux])
-def test_no_energy_without_a_field(kind, order):
-    """A potential of 1 everywhere has no field; every other one has energy."""
-    element = kind(order)
-    matrix = element.condensed(np.array([0.3, 1.0, 2.5]))
-    assert matrix == pytest.approx(matrix.T, abs=1e-12)
-    assert matrix @ element.one == pytest.approx(np.zeros(len(matrix)), abs=1e-10)
-    assert np.sort(np.linalg.eigvalsh(matrix))[1] > 1e-6
-
-
-@pytest.mark.parametrize("kind", [potential, flux])
-def test_one_box_is_a_plate(kind):
-    """Energy at 1 V over one edge, the other sides free: eps times area over height."""
-    element = kind(3)
-    edges = np.array([2.0, 3.0, 0.5])
-    matrix = element.condensed(edges.prod() / (2 * edges**2))
-    lattice = element.numbers
-    low, high = ((lattice[:, 2] == z) & ((lattice[:, 3] == 2) | (kind is potential)) for z in (0, element.pitch))
-    free = ~(low | high)
-    held = np.where(high, element.one, 0.0)
-    held[free] = np.linalg.solve(matrix[free][:, free], -matrix[free] @ held)
-    assert held @ matrix @ held == pytest.approx(2 * 3 / 0.5, rel=1e-10)
-
-
-def test_elimination_is_the_dense_solution():
-    """All unknowns at once, without dissection."""
-    fine = layered(grid(rect_cell(0.2)), [0, 0, 1.00059, 4.68], 0)
-    kind = potential(2)
-    boxes = np.argwhere(fine.fill > 1)
-    count = np.array(fine.fill.shape)
-    keys = kind.keys(boxes, count)
-    names, at = np.unique(keys, return_inverse=True)
-    at = at.reshape(keys.shape)
-    edges = np.column_stack([np.diff(p)[boxes[:, a]] for a, p in enumerate(fine.planes_mm)])
-    eps = np.array([0, 0, 1.00059, 4.68])[fine.fill[tuple(boxes.T)]]
-    whole = np.zeros((len(names),) * 2)
-    for n, here in enumerate(at):
-        whole[np.ix_(here, here)] += kind.condensed(eps[n] * edges[n].prod() / (2 * edges[n] ** 2))
-    values = np.full(len(names), np.nan)
-    for code in (0, 1):
-        on = np.isin(keys, kind.keys(np.argwhere(fine.fill == code), count))
-        ones = np.broadcast_to(kind.one, keys.shape)
-        values[at[on]] = ones[on] * code
-    free = np.isnan(values)
-    values[free] = np.linalg.solve(whole[free][:, free], -whole[free][:, ~free] @ values[~free])
-    boxes = boxes_of(fine, [0, 0, 1.00059, 4.68], kind)
-    assert boxes.least().energy == close(values @ whole @ values, 1e-10)
-    assert boxes.unknowns() == free.sum()
 
 
 def test_scikit_fem_comes_from_above_and_near(rungs):

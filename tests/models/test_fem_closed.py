@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cell_scenes import MM, prism
+from cell_scenes import MM, close, prism
 from scipy.special import ellipk
 
 from sensorgen.core.units import EPS0_F_PER_M
@@ -13,10 +13,6 @@ from sensorgen.models import fem2d
 from sensorgen.scene.scene import Body, Scene, box
 
 VACUUM = {"air": 1.0}
-
-
-def close(expected: float, rel: float):
-    return pytest.approx(expected, rel=rel, abs=0)
 
 
 def coaxial_quarter(corners: int) -> Scene:

@@ -6,20 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cell_scenes import EPS, MM, bars, bumps, few_rings, plates, prism, slab, stairs, tri_cell
+from cell_scenes import EPS, MM, bars, bumps, close, few_rings, plates, prism, slab, stairs, tri_cell
 from numpy.polynomial import legendre
 
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import fem2d, fem3d
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.electrostatics import bounds
-from sensorgen.solvers.electrostatics.elimination import Block, least
 from sensorgen.solvers.electrostatics.plane import SIDES, Cone, Plane, RingLayout, condensed, crossed, ring_corners
-
-
-def close(expected, rel: float):
-    return pytest.approx(expected, rel=rel, abs=0)
-
 
 SLAB = slab()
 ISLANDS = {
@@ -229,26 +223,6 @@ def test_powers_of_a_complex_number_have_their_energy(order):
     twice = np.linalg.det(corners[1:] - corners[0])
     density = order**2 * abs(places[..., 0] + 1j * places[..., 1]) ** (2 * order - 2)
     assert energy == close((np.outer(w * (1 - s), w) * density * twice).sum(), 1e-9)
-
-
-def test_blocks_are_solved_as_one_system():
-    """A few hundred overlapping blocks against one dense solve; values 0 and 1 are held."""
-    random = np.random.default_rng(4)
-    count, blocks, whole = 120, [], np.zeros((120, 120))
-    for n in range(200):
-        ids = (n * 118 // 200 + random.integers(0, 5, 4)) % 118 + 2 if n % 9 else np.array([n % 2, 2 + n % 118, 0, 5])
-        root = random.normal(size=(4, 4))
-        blocks.append(Block(ids, root @ root.T, random.normal(size=2)))
-        for i, k in enumerate(ids):
-            for j, m in enumerate(ids):
-                whole[k, m] += (root @ root.T)[i, j]
-    used = np.union1d(np.concatenate([b.ids for b in blocks]), [0, 1])
-    free = used[used > 1]
-    values = least(blocks, count).values()
-    assert values[[0, 1]].tolist() == [0.0, 1.0]
-    assert values[free] == pytest.approx(
-        -np.linalg.solve(whole[np.ix_(free, free)], whole[free, 1]), rel=1e-8, abs=1e-10
-    )
 
 
 @pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])

@@ -19,10 +19,6 @@ AIR_AT_1E4 = {"x60": 1e4, "air": 1.0}
 FORMS = {"needle": ((0, 0), (1, 0), (0, 1)), "flat": ((0, 0), (1, 0), (0.4, 1)), "wedge": ((0, 0), (1, 0), (1, 1))}
 
 
-def close(expected: float, rel: float):
-    return pytest.approx(expected, rel=rel, abs=0)
-
-
 def gap(length_mm: float, thin_mm: float) -> Scene:
     """Air of even thickness over dielectric, 1 mm together."""
     return plates(Body("x", "x60", (box(0, length_mm, 0, 1, 0.2, 1.2 - thin_mm),)), length_mm=length_mm)

@@ -79,12 +79,9 @@ def test_pieces_of_even_pressure_are_one_patch(sensor):
         assert found.imag == pytest.approx(expected.imag, rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize("profile", ["hertz", "parabola"])
-@pytest.mark.parametrize("position", PLACES)
-@pytest.mark.parametrize(("force", "far_end"), [(0.5, "open"), (2.0, "open"), (2.0, "short"), (2.0, 5e4)])
-def test_slopes_against_differences(profile, position, force, far_end):
-    """By Richardson's rule from two short steps, as a law's slope bends at its points; at the very ends from inside."""
-    sensor, inside = replace(SOFT, profile=profile, far_end=far_end), min(max(position, 1e-3), 0.099)
+def check_slopes(sensor, force, position, by_force, step_m, by_position):
+    """Slopes against differences, within shares of them; places at the very ends are taken from inside."""
+    inside = min(max(position, 1e-3), 0.099)
 
     def by(step, move):
         ahead = [
@@ -93,11 +90,18 @@ def test_slopes_against_differences(profile, position, force, far_end):
         return (4 * ahead[1] - ahead[0]) / 3
 
     found = sensor.response(TONE, force, inside)
+    along, across = by(2e-3, lambda h: (force + h, inside)), by(step_m, lambda h: (force, inside + h))
     for part in (np.real, np.imag):
-        assert part(found.by_force_ohm_per_n) == pytest.approx(part(by(2e-3, lambda h: (force + h, inside))), rel=2e-6)
-        assert part(found.by_position_ohm_per_m) == pytest.approx(
-            part(by(2.5e-6, lambda h: (force, inside + h))), rel=1e-4, abs=1e-3
-        )
+        assert part(found.by_force_ohm_per_n) == pytest.approx(part(along), rel=by_force)
+        assert part(found.by_position_ohm_per_m) == pytest.approx(part(across), rel=by_position, abs=1e-3)
+
+
+@pytest.mark.parametrize("profile", ["hertz", "parabola"])
+@pytest.mark.parametrize("position", PLACES)
+@pytest.mark.parametrize(("force", "far_end"), [(0.5, "open"), (2.0, "open"), (2.0, "short"), (2.0, 5e4)])
+def test_slopes_against_differences(profile, position, force, far_end):
+    """By Richardson's rule from two short steps, as a law's slope bends at its points; at the very ends from inside."""
+    check_slopes(replace(SOFT, profile=profile, far_end=far_end), force, position, 2e-6, 2.5e-6, 1e-4)
 
 
 @pytest.mark.parametrize("profile", ["hertz", "parabola"])
@@ -188,21 +192,9 @@ ROUND = {
 @pytest.mark.parametrize(("force", "far_end"), [(0.5, "open"), (2.0, "open"), (2.0, "short")])
 def test_slopes_of_a_contact_that_grows(profile, position, force, far_end):
     """Against differences by Richardson's rule; where the contact hangs over an end, too."""
-    sensor, inside = replace(ROUND[profile], far_end=far_end), min(max(position, 1e-3), 0.099)
+    sensor = replace(ROUND[profile], far_end=far_end)
     assert 1e-3 < sensor.contact_m(force)[0] < sensor.tip_m
-
-    def by(step, move):
-        ahead = [
-            (sensor.impedance(TONE, *move(h)) - sensor.impedance(TONE, *move(-h))) / (2 * h) for h in (step, step / 2)
-        ]
-        return (4 * ahead[1] - ahead[0]) / 3
-
-    found = sensor.response(TONE, force, inside)
-    for part in (np.real, np.imag):
-        assert part(found.by_force_ohm_per_n) == pytest.approx(part(by(2e-3, lambda h: (force + h, inside))), rel=5e-6)
-        assert part(found.by_position_ohm_per_m) == pytest.approx(
-            part(by(5e-5, lambda h: (force, inside + h))), rel=2e-3, abs=1e-3
-        )
+    check_slopes(sensor, force, position, 5e-6, 5e-5, 2e-3)
 
 
 @pytest.mark.parametrize("profile", ROUND)

@@ -69,15 +69,6 @@ def test_choices_of_the_boundary(name, held, nu):
     assert found.displacement_m[1:] * 1e6 == pytest.approx(known[1:], rel=0.02)
 
 
-@pytest.mark.nightly  # friction that sticks: choices of the boundary
-def test_sticking_depends_little_on_the_loads_asked_for():
-    few, many = (
-        press2d.press(tri(), solids(), s, boundary=BoundaryConditions(contact="stick"))
-        for s in ([0, 2e4], STRESSES[:3])
-    )
-    assert few.displacement_m[-1] == pytest.approx(many.displacement_m[-1], rel=1e-6)
-
-
 def test_exactly_incompressible_is_the_limit():
     moved = [press2d.press(tri(), solids(nu), STRESSES[:2]).displacement_m[-1] for nu in (0.4999, 0.49999, 0.5)]
     assert moved[2] == pytest.approx(moved[1], rel=1e-3)
@@ -101,15 +92,6 @@ def test_soft_x60_reaches_100_kpa():
     finer = press2d.press(tri(), solids(x60=1e6), stress, fineness=Fineness(3e-3, 0.025, 0.075, 0.35))
     assert finer.faults == ()
     assert found.displacement_m[1:] == pytest.approx(finer.displacement_m[1:], rel=0.01)
-
-
-@pytest.mark.nightly  # tests/test_compression_error.py: meshes converge by the order that is assumed
-def test_a_finer_mesh_agrees():
-    coarse, fine = (
-        press2d.press(tri(), solids(), STRESSES[:6:5], fineness=f) for f in (Fineness(), Fineness().finer())
-    )
-    assert press2d.compared(coarse, fine).faults == ()
-    assert coarse.displacement_m[-1] == pytest.approx(fine.displacement_m[-1], rel=5e-3)
 
 
 def test_levels_that_differ_are_told():
@@ -226,15 +208,6 @@ def test_outlines_that_are_closed_in_the_wrong_place_do_not_pass(monkeypatch):
     assert "could not be meshed" in found.faults[-1]
 
 
-def test_areas_are_weighed_when_gaps_are_closed():
-    cell = tri()
-    mesh = press2d.mesh_of(cell, Fineness(1.4e-3, 0.1, 0.2))
-    still = np.zeros(2 * len(mesh.points_m))
-    assert closing.misfit(cell, mesh, still) < 1e-8
-    taller = np.column_stack([0 * mesh.points_m[:, 0], 0.01 * mesh.points_m[:, 1]]).ravel()
-    assert closing.misfit(cell, mesh, taller) == pytest.approx(1 - 1 / 1.01, rel=1e-6)
-
-
 @pytest.mark.parametrize(("film", "period"), [(0.02, 2.0), (0.1, 1.0), (0.1, 4.0)])
 def test_thin_films_and_other_periods_are_pressed_at_once(film, period):
     found = press2d.press(
@@ -262,13 +235,6 @@ def test_what_is_no_prism_or_no_solid_is_refused():
         press2d.Elastic(6e6, 0.51)
     with pytest.raises(BadInput, match="bonded or sliding"):
         press2d.press(tri(), solids(), [0.0, 1.0], boundary=BoundaryConditions(base="glued"))
-
-
-def test_work_and_energy_are_weighed():
-    """A linear spring stores half of stress times way; if it stores more or less, that is told as a share."""
-    stress = moved = np.array([0.0, 1.0, 2.0])
-    assert pressed._imbalance(stress, moved, np.array([0.0, 0.5, 2.0])) == pytest.approx([0, 0, 0], abs=1e-12)
-    assert pressed._imbalance(stress, moved, np.array([0.0, 0.5, 2.5]))[2] == pytest.approx(-0.2)
 
 
 @pytest.mark.parametrize("stiffer", [2, 5, 10])

@@ -13,7 +13,6 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models import fem2d, fem3d, press2d, press3d, springs
-from sensorgen.models.compression import curve_of
 from sensorgen.models.press3d import BoundaryConditions, BrickCounts, Elastic
 from sensorgen.prediction.mesh_ladder import limit
 from sensorgen.scene.scene import Body, Scene, box
@@ -21,9 +20,7 @@ from sensorgen.solvers.contact import (
     contact,
     element,
     factors,
-    load,
     mapped_field,
-    pressed,
 )
 from sensorgen.solvers.contact import mapped_field as air
 from sensorgen.solvers.contact.bricks import Bricks, mesh_of
@@ -406,25 +403,6 @@ def test_moduli_scale_and_incompressible_is_the_limit():
     assert moved[0] > moved[1] > moved[2] > 0.995 * moved[0]
 
 
-def test_both_directions_of_the_strips_are_one():
-    moved = [
-        press3d.press(press3d.cell(rect(along=way)), solids(), [0.0, 5e4], fineness=BrickCounts(1)).displacement_m[-1]
-        for way in ("xy", "yx")
-    ]
-    assert moved[0] == pytest.approx(moved[1], rel=1e-6)
-
-
-def test_what_does_not_converge_ends_with_the_last_load(monkeypatch):
-    stepped = load.Problem.stepped
-    monkeypatch.setattr(
-        load.Problem, "stepped", lambda self, s, p, before, **_: stepped(self, s, p, before) if p < 1.5e4 else None
-    )
-    found = press3d.press(press3d.cell(rect()), solids(), [0.0, 1e4, 2e4], fineness=BrickCounts(1))
-    assert (found.converged_pa, found.faults) == (1e4, ("converged up to 10 of 20 kPa",))
-    with pytest.raises(OutOfRange, match="not to be trusted"):
-        curve_of(found)
-
-
 def test_what_is_wrong_is_refused():
     with pytest.raises(BadInput, match="needs a scene of boxes"):
         press3d.cell(make({"shape": "tri"}).in_use)
@@ -432,8 +410,6 @@ def test_what_is_wrong_is_refused():
     over = Scene((Body("a", "x60", (box(0, 1, 0, 1, 0, 1),)), Body("b", "etpu", (box(0, 1, 0, 1, 0.5, 2),))), (1, 1, 2))
     with pytest.raises(BadInput, match="b overlaps"):
         press3d.cell(over)
-    with pytest.raises(BadInput, match="bonded or sliding"):
-        press3d.press(press3d.cell(rect()), solids(), [0.0, 1.0], boundary=BoundaryConditions(base="glued"))
     touching = boxes(((0, 1), (0, 1), (0, 1, 2, 3)), [[[2, 3, 1]]])
     with pytest.raises(BadInput, match="no dielectric lies between"):
         unmoved(touching, FieldOrders())
@@ -461,20 +437,6 @@ def test_conjugate_gradients_make_new_factors_where_the_old_ones_do_not_serve():
         right = rng.normal(size=216)
         assert full @ solver(csr_matrix(full), right) == pytest.approx(right, abs=1e-6)
     assert solver(csr_matrix(full - 1e6 * np.eye(216)), right) is None
-
-
-def test_factors_are_those_of_the_whole_matrix():
-    rng = np.random.default_rng(4)
-    places = np.array(list(product(range(9), range(7), range(5))))
-    near = abs(places[:, None] - places[None]).max(axis=2) <= 1
-    half = np.where(near, rng.normal(size=near.shape), 0.0)
-    matrix = csr_matrix(half @ half.T + np.eye(len(places)))
-    order = factors.order_of(matrix, places)
-    assert len(order.fronts) > 5
-    assert sorted(order.turn) == list(range(len(places)))
-    right = rng.normal(size=len(places))
-    found = factors.factored(matrix, order).solve(right)
-    assert found == pytest.approx(np.linalg.solve(matrix.toarray(), right), rel=1e-4, abs=1e-5)  # of single precision
 
 
 def mesh_of_order_two(pieces, stress, rise=2e-9, moved=1e-6, error=0.3):
@@ -550,7 +512,3 @@ def test_air_goes_along_evenly_with_what_is_stretched_evenly():
     stretched = np.array([0.03, 0.02, -0.1])
     found = air.AirMap(whole, solid).displacements_m(solid.points_m * stretched, 1e-4).reshape(-1, 3)
     assert found == pytest.approx(whole.points_m * stretched, abs=1e-12)
-
-
-def test_a_stiffer_cell_has_a_stiffer_contact():
-    assert pressed.penalty_pa(22e6) == 22 * pressed.penalty_pa(1e6)

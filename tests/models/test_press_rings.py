@@ -92,11 +92,6 @@ def test_stairs_are_near_their_limit_on_the_mesh_that_is_used():
     assert grown[0] == pytest.approx(grown[1], rel=7e-3)
 
 
-def test_finer_levels_are_finer_at_the_apex_too():
-    assert LEVELS[1] == Fineness(5e-4, 0.025, 0.075, 0.25)
-    assert Fineness().scaled(2) == Fineness(2e-3, 0.1, 0.3, 1.0)
-
-
 def test_a_wedge_is_filled_though_its_corners_lie_on_a_line():
     places = [(0.0, 0.0), (1.0, 0.02), (2.0, 0.04), (3.0, 0.06), (3.1, 0.5), (2.0, 0.3), (1.0, 0.15)]
     found = plane_field.filled(range(len(places)), places)

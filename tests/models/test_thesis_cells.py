@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from cell_scenes import EPS, MM, rect_cell, tri_cell
+from cell_scenes import CELLS, EPS, MM, close, rect_cell, tri_cell
 from scipy.integrate import quad
 
 from sensorgen.core.errors import OutOfRange
@@ -15,11 +15,6 @@ from sensorgen.models import columns, fem2d, fem3d, thesis_cells
 from sensorgen.scene.scene import Fill
 
 CONTACT = json.loads((Path(__file__).parents[1] / "reference" / "contact.json").read_text("utf-8"))
-CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
-
-
-def close(expected: float, rel: float):
-    return pytest.approx(expected, rel=rel, abs=0)
 
 
 @pytest.mark.parametrize("film", [0.05, 0.1, 0.2])
