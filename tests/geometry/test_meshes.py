@@ -116,12 +116,3 @@ def test_crossed_strips_are_one_shell_and_separate_strips_are_many():
     scene = rect.scene(rect.Params(length_mm=8.0, width_mm=4.0), Fill())
     assert second_program(mesh(scene.body("top_electrode_with_cogs"))).body_count == 1
     assert second_program(mesh(scene.body("hanging_dielectric"))).body_count == 2  # one per period over the width
-
-
-def test_mesh_volume_is_exact_far_from_the_origin():
-    body = Body("cube", "x60", (box(1e6, 1e6 + 1, 1e6, 1e6 + 1, 1e6, 1e6 + 1),))
-    assert mesh(body).volume_mm3() == pytest.approx(1.0, rel=1e-12)
-
-
-def test_an_empty_mesh_has_no_volume():
-    assert Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)).volume_mm3() == 0.0

@@ -7,8 +7,6 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.records import checked
 from sensorgen.design.design import make
 from sensorgen.measure.virtual.mechanics import (
-    BY_DEVICE,
-    FAULTS,
     OPEN_OHM,
     Mechanics,
     VirtualRig,
@@ -266,11 +264,6 @@ def test_a_short_opens_under_load():
     found.drive(4.0)
     found.advance(3.0)
     assert abs(found.impedance(TONES_HZ)[0]) > 1e5
-
-
-def test_every_fault_has_a_simulator_and_a_line():
-    assert all(words and "\n" not in words for of in BY_DEVICE.values() for words in of.values())
-    assert all(name.startswith(fault.strikes) for name, fault in FAULTS.items())
 
 
 def test_overrides_are_taken_and_the_rest_is_drawn():

@@ -7,7 +7,6 @@ import pytest
 from cell_scenes import CELLS, EPS, MM, between_curves, bumps, close, plates, rect_cell, stairs, tri_cell
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import reference, tri
 from sensorgen.models import columns, fem2d
 from sensorgen.scene.scene import Body, Fill, Scene, box
@@ -76,52 +75,6 @@ def test_support_of_the_films_kind_fills_the_air():
     with_support = fem2d.capacitance(filled, EPS | {"pva": 3.0}, 1e-6)
     with_air = fem2d.capacitance(tri_cell(0.1), {"x60": 4.68, "air": 3.0}, 1e-6)
     assert with_support.middle() == close(with_air.middle(), 1e-6)
-
-
-def skfem_bounds(scene: Scene, eps: dict[str, float], refine: int) -> tuple[float, float]:
-    """P2 elements of scikit-fem on the same few triangles, refined everywhere: from above, and the last gain."""
-    skfem = pytest.importorskip("skfem")
-    from skfem.helpers import dot, grad
-
-    section, coarse = fem2d._triangles(scene)
-    used, corners = np.unique(np.array(coarse.triangles), return_inverse=True)
-    mesh = skfem.MeshTri(coarse.points[used].T.copy(), corners.reshape(-1, 3).T.copy())
-    values = np.array([eps[m] * share for m, share in coarse.regions])
-    found = []
-    for _ in range(refine):
-        mesh = mesh.refined()
-        middle = mesh.p[:, mesh.t].mean(1)
-        owner = skfem.MeshTri(coarse.points[used].T.copy(), corners.reshape(-1, 3).T.copy()).element_finder()(*middle)
-        basis = skfem.Basis(mesh, skfem.ElementTriP2(), intorder=4)
-        weight = skfem.Basis(mesh, skfem.ElementTriP0(), intorder=4).interpolate(values[owner])
-        matrix = skfem.BilinearForm(lambda u, v, w: w.eps * dot(grad(u), grad(v))).assemble(basis, eps=weight)
-        x = np.zeros(basis.N)
-        held = []
-        for edge, end in coarse.terminals.items():
-            a, b = (coarse.points[k] for k in edge)
-            here = np.flatnonzero(_off(a, b, basis.doflocs) < 1e-12)
-            x[here] = float(end == "top")
-            held.append(here)
-        x = skfem.solve(*skfem.condense(matrix, x=x, D=np.unique(np.concatenate(held))))
-        found.append(float(x @ matrix @ x) * EPS0_F_PER_M * MM * section.depth_mm)
-    return found[-1], found[-2] - found[-1]
-
-
-def _off(a, b, points):
-    """How far points lie off a straight piece."""
-    along = (b - a) / np.hypot(*(b - a))
-    share = np.clip((points.T - a) @ along, 0, np.hypot(*(b - a)))
-    return np.hypot(*(points.T - a - share[:, None] * along).T)
-
-
-@pytest.mark.parametrize("name", ["stairs", "bumps", "flatter", "curved"])
-def test_scikit_fem_comes_from_above_and_near(name):
-    scene = GENERAL[name]
-    above, gain = skfem_bounds(scene, EPS, 4)
-    found = fem2d.capacitance(scene, EPS, 1e-6)
-    assert found.lower < above
-    assert 0 < above - found.middle() < 3 * gain  # singular corners halve the error or better with each refinement
-    assert above == close(found.middle(), 1e-2)
 
 
 @pytest.mark.parametrize(

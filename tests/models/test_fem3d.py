@@ -290,31 +290,6 @@ def test_what_both_fields_cannot_make_is_the_difference_of_their_energies():
     assert energy > 0
 
 
-def test_scikit_fem_comes_from_above_and_near(rungs):
-    """Hexahedra of second order on the same boxes, graded by hand: above the lower bound, near the upper one."""
-    skfem = pytest.importorskip("skfem")
-    from skfem.helpers import dot, grad
-
-    fine = layered(grid(rect_cell(0.2)), [0, 0, 1.00059, 4.68], 1)
-    mesh = skfem.MeshHex.init_tensor(*fine.planes_mm)
-    middle = mesh.p[:, mesh.t].mean(1)
-    at = [np.searchsorted(p, m) - 1 for p, m in zip(fine.planes_mm, middle, strict=True)]
-    fill = fine.fill[tuple(at)]
-    basis = skfem.Basis(mesh, skfem.ElementHex2())
-    eps = skfem.Basis(mesh, skfem.ElementHex0(), quadrature=basis.quadrature).interpolate(
-        np.where(fill > 1, np.array([0, 0, 1.00059, 4.68])[fill], 1e-9)
-    )
-    matrix = skfem.BilinearForm(lambda u, v, w: w.eps * dot(grad(u), grad(v))).assemble(basis, eps=eps)
-    x = np.zeros(basis.N)
-    held = [np.unique(basis.element_dofs[:, fill == code]) for code in (0, 1)]
-    x[held[1]] = 1.0
-    x = skfem.solve(*skfem.condense(matrix, x=x, D=np.concatenate(held)))
-    above = float(x @ matrix @ x) * EPS0_F_PER_M * MM * 4
-    best = rungs[0.2][-1].interval
-    assert best.lower < above
-    assert above == close(best.upper, 8e-3)
-
-
 def test_it_needs_neither_ngsolve_nor_the_cad_kernel():
     program = (
         "import sys; from sensorgen.models import fem3d, columns\n"

@@ -35,14 +35,6 @@ def test_one_film_has_the_bound_that_is_known_of_the_plate():
     assert found[0].force_n.known == pytest.approx(2.25, rel=0.02)
 
 
-def test_equal_films_cancel_the_force_in_their_difference():
-    found = by_name(TWINS)
-    assert found["difference alone"].force_n.known is None
-    assert found["both readings"].force_n.known == pytest.approx(
-        found["upper film alone"].force_n.known / np.sqrt(2), rel=1e-3
-    )
-
-
 def test_a_stiff_second_film_takes_the_drift_away():
     found = by_name(STIFF_BELOW)
     alone, both = found["upper film alone"].force_n, found["both readings"].force_n
