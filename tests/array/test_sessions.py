@@ -10,7 +10,7 @@ from insole_sessions import Insole
 from in_process import run
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.array_frames import refuse_swapped, session
+from sensorgen.measure.array_frames import session
 from sensorgen.prediction.array import sessions as calibration
 from sensorgen.prediction.array.elements import (
     ArraySession,
@@ -447,21 +447,6 @@ def test_no_study_is_an_error(days):
     deaf = replace(days[0], reading=np.random.default_rng(0).normal(size=days[0].reading.shape))
     with pytest.raises(BadInput, match="no element's reading follows"):
         calibrated([deaf])
-
-
-def test_swapped_wires_are_named():
-    shape, kpa = (2, 3), np.full((3, 6), np.nan)
-    kpa[[0, 1, 2], [0, 1, 5]] = 100.0
-    reading = np.zeros((3, 6))
-    none = np.full(3, np.nan)
-
-    def pressed(order):
-        reads = np.where(np.isfinite(kpa), 0.1, 0.0).reshape(3, *shape)[:, :, order].reshape(3, 6)
-        return ArraySession("p", 0.0, np.arange(3.0), reading + reads, none < 0, kpa, none)
-
-    refuse_swapped(pressed([0, 1, 2]), shape)
-    with pytest.raises(BadInput, match="presses on c1 are read at c2: wires swapped"):
-        refuse_swapped(pressed([1, 0, 2]), shape)
 
 
 def test_commands_calibrate_and_invert_any_array(tmp_path):

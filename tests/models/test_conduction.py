@@ -111,28 +111,6 @@ def test_the_width_falls_by_a_factor_with_each_order(monkeypatch):
     assert all(b < a / 4 for a, b in pairwise(taken))
 
 
-@pytest.mark.parametrize("height", [1e-2, 3e-2, 0.1])
-def test_teeth_that_get_flat_change_nothing(height):
-    found = ratio(tri_scene(hang_height_mm=height, lower_height_mm=height / 2), width=1e-6)
-    mean = height / 4 / 0.3  # of the teeth, as a share of the plate
-    assert 1 / (1 + mean) < found.lower < found.upper < 1
-    assert found.middle() == close(1 - mean, 8 * mean**1.5)
-
-
-def test_teeth_that_touch_come_near_the_thicker_plate():
-    """Bars of 0.5 mm, ever nearer: from above, to a plate of 0.8 mm, and their volume bounds them from below."""
-    values = []
-    for gap in (0.2, 0.02, 0.002):
-        teeth = [box(k + gap / 2, k + 1 - gap / 2, 0, 1, 0.0, 0.5) for k in range(10)]
-        scene = metal(box(0, 10, 0, 1, 0.5, 0.8), *teeth, size_mm=(10.0, 1.0, 0.8))
-        found = ratio(scene)
-        assert 0.3 / 0.8 < found.lower < found.upper < 1
-        values.append(found.middle())
-    assert values == sorted(values, reverse=True)
-    solid = metal(box(0, 10, 0, 1, 0.5, 0.8), box(0, 10, 0, 1, 0.0, 0.5), size_mm=(10.0, 1.0, 0.8))
-    assert ratio(solid).middle() == close(0.3 / 0.8, 1e-12)
-
-
 @pytest.mark.parametrize(("shape", "end"), [(reference, "top"), (double, "middle"), (tri, "bottom"), (rect, "bottom")])
 def test_a_plate_without_cogs_is_exact(shape, end):
     found = ratio(shape.scene(shape.Params(), Fill()), end)

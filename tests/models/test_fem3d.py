@@ -15,8 +15,7 @@ from sensorgen.design.shapes import rect
 from sensorgen.models import columns, fem3d
 from sensorgen.scene.scene import Body, Fill, Scene, box
 from sensorgen.solvers.electrostatics.bounds import FieldStep
-from sensorgen.solvers.electrostatics.boxes import Pair, grid, layered, whole
-from sensorgen.solvers.electrostatics.elimination import HELD
+from sensorgen.solvers.electrostatics.boxes import grid, whole
 
 
 @pytest.fixture(scope="module")
@@ -85,18 +84,6 @@ def test_slabs_that_the_sensors_end_cuts():
     scene, exact = cut_slabs()
     found = fem3d.capacitance(scene, EPS)
     assert (found.lower, found.upper) == close((exact, exact), 1e-6)  # the root of what doubles lose
-
-
-def test_layers_stand_where_dielectrics_meet_at_a_corner():
-    """A box of another permittivity between plates, touching neither; none where all is of one kind."""
-    post = plates(Body("post", "x60", (box(0.5, 1.5, 0, 1, 0.5, 0.9),)))
-    coarse = grid(post)
-    same, other = (layered(coarse, [0, 0, *eps], 2) for eps in ([4.0, 4.0], [1.0, 4.68]))
-    planes = [[len(p) for p in found.planes_mm] for found in (coarse, same, other)]
-    assert planes[1] == planes[0]
-    assert planes[2][0] > planes[0][0]
-    assert planes[2][1] == planes[0][1]  # along the edges the field is smooth
-    assert planes[2][2] > planes[0][2]
 
 
 def feet(x: tuple[float, float], y: tuple[float, float] | None = None) -> Scene:
@@ -211,18 +198,6 @@ def test_a_sensor_that_the_end_cuts_in_both_directions_as_voxels_have_it():
     assert all_of_it / one * 4 != close(1000 / 1.1**2, 3e-3)  # by area alone it would not be caught
 
 
-def test_meshes_grow_by_steps():
-    """No mesh couples more than three times the unknowns of the one before."""
-    coarse, values = grid(rect_cell(0.1)), [0, 0, 1.00059, 4.68]
-    unknowns = [
-        Pair.of(layered(coarse, values, m.layers), values, m.order, m.flux_order).unknowns() for m in fem3d.MESHES
-    ]
-    ratios = np.divide(unknowns[1:], unknowns[:-1])
-    assert (ratios > 1).all()
-    assert (ratios < 3).all()
-    assert [m.width for m in fem3d.MESHES] == sorted((m.width for m in fem3d.MESHES), reverse=True)
-
-
 @pytest.mark.parametrize(
     ("first", "width", "meshes"),
     [(1.0, 1.4e-3, [0, 1, 2]), (2.0, 1e-3, [0, 3, 4]), (2.0, 1e-9, [0, 8]), (0.1, 1e-3, [0])],
@@ -263,31 +238,6 @@ def test_a_part_lies_where_any_flux_so_near_has_it(least):
             assert bounds.lower <= truth <= bounds.upper
             seen.append(max(truth - bounds.lower, bounds.upper - truth) / (bounds.upper - bounds.lower))
         assert max(seen) > 0.8
-
-
-def test_what_both_fields_cannot_make_is_the_difference_of_their_energies():
-    """Prager and Synge: of a potential and a flux that one force drives."""
-    scene = feet((0.0, 4.45))
-    coarse = grid(scene)
-    pair = Pair.of(
-        layered(coarse, [0, 0, *(EPS[n] for n in coarse.names[2:])], 1),
-        [0, 0, *(EPS[n] for n in coarse.names[2:])],
-        3,
-        2,
-    )
-    level = pair.flux.solved()
-    energy, unmet = pair.part(level, pair.flux.eps)
-    load = (pair.flux.shares - pair.flux.shares.min())[:, None] * pair.flux.answers(level)
-    drives = (pair.flux.pushed(load), pair.potential.pushed(load @ pair.seen))
-    dual, primal = (-driven.least().energy for driven in drives)
-    for driven in drives:  # forces are in balance, at 0 V on both electrodes: what leaves a box enters its neighbour
-        found = driven.solved()
-        left = np.bincount(driven.ids.ravel(), (driven.load - driven.answers(found)).ravel())
-        assert np.abs(left[HELD:]).max() < 1e-9 * np.abs(load).max()
-        assert (found[driven.ids < HELD] == 0).all()
-    assert unmet == close(dual - primal, 1e-6)
-    assert 0 < unmet < 0.2 * dual
-    assert energy > 0
 
 
 def test_it_needs_neither_ngsolve_nor_the_cad_kernel():

@@ -6,14 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cell_scenes import EPS, MM, bars, bumps, close, few_rings, plates, prism, slab, stairs, tri_cell
+from cell_scenes import EPS, bars, bumps, close, few_rings, plates, prism, slab, stairs, tri_cell
 from numpy.polynomial import legendre
 
-from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import fem2d, fem3d
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.electrostatics import bounds
-from sensorgen.solvers.electrostatics.plane import SIDES, Cone, Plane, RingLayout, condensed, crossed, ring_corners
+from sensorgen.solvers.electrostatics.plane import Cone, RingLayout, condensed, ring_corners
 
 SLAB = slab()
 ISLANDS = {
@@ -188,43 +187,6 @@ def test_values_inside_a_cone_have_its_energy():
         assert energy == close(values @ cone.matrix @ values, 1e-11)
 
 
-def on_sides(corners: np.ndarray, function, order: int) -> np.ndarray:
-    """A function's values at corners, and modes of its sides from its slope along them."""
-    s, weight = np.polynomial.legendre.leggauss(3 * order)
-    found = [function(*p) for p in corners]
-    for a, b in SIDES:
-        x, y = (corners[a][:, None] * (1 - s) + corners[b][:, None] * (1 + s)) / 2
-        value = function(x, y)
-        for k in range(2, order + 1):
-            mode = legendre.Legendre.basis(k - 1)
-            ends = found[b] * mode(1) - found[a] * mode(-1)
-            found.append((ends - (weight * value * mode.deriv()(s)).sum()) * np.sqrt(k - 0.5))
-    return np.array(found)
-
-
-@pytest.mark.parametrize("order", [1, 2, 5, 9, 16])
-def test_powers_of_a_complex_number_have_their_energy(order):
-    """Re and Im of (x + i y)^order: both of one energy, their product's integral none, and each other's curl."""
-    corners = np.array([[0.2, 0.1], [1.1, 0.4], [0.3, 0.9]])
-    matrix = condensed(corners[None], order)[0]
-    real, imag = (on_sides(corners, lambda x, y, p=p: p((x + 1j * y) ** order), order) for p in (np.real, np.imag))
-    energy = real @ matrix @ real
-    assert imag @ matrix @ imag == close(energy, 1e-10)
-    assert real @ matrix @ imag == pytest.approx(0.0, abs=1e-10 * energy)
-    assert real @ crossed(order) @ imag == close(energy, 1e-10)
-    assert np.ones(3) @ matrix[:3, :3] @ np.ones(3) == pytest.approx(0.0, abs=1e-12)
-    # by quadrature over the triangle, whose sides' equations this does not use
-    s, w = np.polynomial.legendre.leggauss(order + 2)
-    s, w = (s + 1) / 2, w / 2
-    u, v = np.meshgrid(s, s)
-    places = (
-        corners[0] + (u * (1 - v))[..., None] * (corners[1] - corners[0]) + v[..., None] * (corners[2] - corners[0])
-    )
-    twice = np.linalg.det(corners[1:] - corners[0])
-    density = order**2 * abs(places[..., 0] + 1j * places[..., 1]) ** (2 * order - 2)
-    assert energy == close((np.outer(w * (1 - s), w) * density * twice).sum(), 1e-9)
-
-
 @pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])
 def test_high_ratios_of_permittivity_at_a_sharp_wedge(ratio):
     """1e-4 at all of them; coarser bounds hold the finer, and C is homogeneous in the permittivities."""
@@ -237,23 +199,6 @@ def test_high_ratios_of_permittivity_at_a_sharp_wedge(ratio):
     assert scaled.middle() * ratio == close(fine.middle(), 1e-8)
 
 
-@pytest.mark.parametrize("thin", [1e-5, 1e-6, 2e-7])
-def test_air_of_a_nanometre_over_a_millimetre(thin):
-    """Layers in series, where doubles lose more than elsewhere; and a film that bends by half its own thickness."""
-    gap = plates(Body("x", "x60", (box(0, 2, 0, 1, 0.2, 1.2 - thin),)))
-    exact = EPS0_F_PER_M * 2 * MM / ((1 - thin) / 4.68 + thin / 1.00059)
-    found = fem2d.capacitance(gap, EPS, 1e-6)
-    assert found.lower <= exact <= found.upper
-    assert found.width() < 1e-6
-    tip = prism((0, 0.2), (2, 0.2), (2, 1.2 - thin), (0, 1.2))
-    assert fem2d.capacitance(plates(Body("x", "x60", (tip,))), EPS, 1e-4).width() < 1e-6
-    bent = prism((0, 0.2), (2, 0.2), (2, 1.2 - thin), (1, 1.2 - thin / 2), (0, 1.2 - thin))
-    thinner = fem2d.capacitance(plates(Body("x", "x60", (bent,))), EPS, 1e-4)
-    assert thinner.width() < 1e-6
-    assert found.lower < thinner.upper
-    assert thinner.lower < EPS0_F_PER_M * 2 * MM / ((1 - thin / 2) / 4.68 + thin / 2 / 1.00059)
-
-
 def test_it_needs_numpy_only():
     code = (
         "import sys\nfrom sensorgen.models import fem2d\nfrom sensorgen.design.shapes import tri\n"
@@ -262,14 +207,3 @@ def test_it_needs_numpy_only():
         "assert not {'ngsolve', 'netgen', 'scipy', 'build123d'} & set(sys.modules), sorted(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
-
-
-def test_both_functions_tell_one_flux():
-    """What flows into the top is 1 V times the flux, over every triangle; for any two functions of the right ends."""
-    plane = Plane(few_rings(ISLANDS["in a row"]), 4)
-    eps, _ = fem2d._by_triangle(plane.mesh, EPS)
-    u, psi = plane.potential(eps), plane.stream(1 / eps)
-    rough = plane.potential(np.ones_like(eps))
-    flux = plane.crossings(u, psi).sum()
-    assert plane.crossings(rough, psi).sum() == close(flux, 1e-10)
-    assert (plane.energies(psi, psi) / eps).sum() == close(flux, 1e-10)

@@ -70,13 +70,6 @@ def test_direct_current_through_a_leak_and_a_short():
     assert impedance(PressedLine(**dc, leak_s_per_m=1e-3)) == pytest.approx(leaky, rel=1e-13)
 
 
-def test_only_the_sum_of_the_tracks_counts():
-    swapped = PLATE | {"top_resistivity_ohm_m": 0.2, "bottom_resistivity_ohm_m": 0.07}
-    equal = PLATE | {"top_resistivity_ohm_m": 0.135, "bottom_resistivity_ohm_m": 0.135}
-    for other in (swapped, equal):
-        assert impedance(PressedLine(**other)) == pytest.approx(impedance(PressedLine(**PLATE)), rel=1e-14)
-
-
 def test_at_low_frequency_it_is_a_third_of_the_resistance_before_a_capacitor():
     """Errata 2.24: not the whole of it."""
     z = impedance(PressedLine(**PLATE | {"force_n": 0.0, "frequency_hz": 1.0}))

@@ -117,32 +117,6 @@ def test_pieces_converge_with_the_square_of_their_number(profile, position):
     assert orders == pytest.approx(2.0, abs=0.15)
 
 
-def test_a_light_press_does_not_care_how_it_is_spread():
-    """Where film and force are in proportion, at low frequency, only the mean counts: 2nd order in the force."""
-    change = {
-        p: replace(PLATE, profile=p).impedance(1.1e3, 1e-3, 0.05) - PLATE.impedance(1.1e3, 0.0, 0.05)
-        for p in ("uniform", "hertz", "parabola")
-    }
-    assert change["hertz"].imag == pytest.approx(change["uniform"].imag, rel=1e-5)
-    assert change["parabola"].imag == pytest.approx(change["uniform"].imag, rel=1e-5)
-
-
-def test_spread_raises_the_capacitance_of_a_plate():
-    """C ~ 1 / (1 - s) is convex: uneven pressure makes more of it (Jensen), the more uneven the more."""
-    even, hertz, parabola = (
-        replace(PLATE, profile=p).impedance(1.1e3, 6.0, 0.05).imag for p in ("uniform", "hertz", "parabola")
-    )
-    assert even < hertz < parabola < 0
-
-
-def test_turned_around_it_is_the_same_from_the_other_side():
-    """A line open at both ends has the same capacitance whichever side the tip presses."""
-    sensor = replace(SOFT, profile="hertz", piezoresistance_per_pa=(0.0, 0.0), resistivity_ohm_m=(0.0, 0.0))
-    assert complex(sensor.impedance(1e3, 2.0, 0.003)) == pytest.approx(
-        complex(sensor.impedance(1e3, 2.0, 0.097)), rel=1e-12
-    )
-
-
 def test_without_force_there_is_no_trace_of_position():
     found = replace(SOFT, profile="hertz").response(TONE[:, None], 0.0, np.linspace(0, 0.1, 7))
     assert not found.by_position_ohm_per_m[:, 1:-1].any()

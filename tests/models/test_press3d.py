@@ -345,30 +345,6 @@ def test_points_meet_the_nearest_face_along_their_normal():
     assert normal[:, :2] / -normal[:, 2:] == pytest.approx(slopes, rel=1e-9)
 
 
-def test_frozen_partners_follow_a_slide_to_first_order():
-    """A flat sheet slides under a bent one: gap and slip from the partners of before, and from those found anew."""
-    gap = boxes(((0, 1, 2), (0, 1), (0, 0.1, 0.3, 0.4)), [[[1, 0, 1]]] * 2)
-    mesh = mesh_of(gap, gap.fill > 0)
-    x, y, z = mesh.points_m.T
-    moved = mesh.points_m.copy()
-    above = z > 0.2e-3
-    moved[above, 2] += 100 * x[above] ** 2 - 1e-4 * y[above] * 1e3 - 0.15e-3
-    faces = contact.brick_faces_of(mesh)
-    flat = np.flatnonzero(np.abs(faces.rays(moved).here_m[:, 2] - 1e-4) < 1e-9)
-    pairs = faces.project(moved, 1e6)
-    pairs = pairs.some(np.isin(pairs.point, flat))
-    assert len(pairs.point) == 18
-    slid = moved + np.where(above, 0.0, 1e-7)[:, None] * [1, -1, 0]
-    again = faces.project(slid, 1e6)
-    again = again.some(np.isin(again.point, pairs.point))
-    before, frozen, expected = pairs.gap @ moved.ravel(), pairs.gap @ slid.ravel(), again.gap @ slid.ravel()
-    assert np.abs(frozen - expected).max() < 2e-12 + 1e-4 * np.abs(expected).max()
-    assert np.abs(expected - before).max() > 1e-8
-    level = np.array([slip @ slid.ravel() for slip in pairs.slips])
-    assert np.hypot(*level) == pytest.approx(np.sqrt(2) * 1e-7, rel=1e-6)
-    assert np.array([slip @ moved.ravel() for slip in pairs.slips]) == pytest.approx(0, abs=1e-15)
-
-
 def test_a_block_that_bulges_to_a_mirror_meets_its_image():
     """Two soft blocks beside a slot, and one of them beside the mirror in its middle."""
     soft = {"x60": Elastic(1e6, 0.49), "etpu": Elastic(1e9, 0.3)}
@@ -380,15 +356,6 @@ def test_a_block_that_bulges_to_a_mirror_meets_its_image():
     assert half.displacement_m == pytest.approx(both.displacement_m, rel=2e-3, abs=1e-15)
     moved = np.diff(half.displacement_m)
     assert moved[2] < 0.65 * moved[0]
-
-
-def test_gaps_are_runs_of_air_between_solids_along_each_axis():
-    fill = np.array([[[1, 0, 1, 1]], [[1, 0, 0, 1]], [[0, 0, 0, 1]]])
-    found = {axis: (below.tolist(), above.tolist()) for axis, below, above in air.facing(fill)}
-    assert found[2] == ([[0, 0, 0], [1, 0, 0]], [[0, 0, 2], [1, 0, 3]])
-    assert found[0] == found[1] == ([], [])
-    slot = np.array([[[1]], [[0]], [[2]]])
-    assert [len(below) for _, below, _ in air.facing(slot)] == [1, 0, 0]
 
 
 def test_moduli_scale_and_incompressible_is_the_limit():

@@ -70,28 +70,6 @@ def test_with_edge_contacts_it_is_the_line_in_second_order(part, s_n):
     assert errors[2] < 2e-4
 
 
-@pytest.mark.parametrize("x", [0.0, 0.0377, 0.0431, 0.09])
-def test_derivatives_are_those_of_the_line(x):
-    inputs, press = strip_press(x, 1.4, 0.0)
-    tones = TONES[1:3]
-    names = ["left_m", "top_piezoresistance_per_n", "bottom_piezoresistance_per_n", "modulus_pa"]
-    _, by = line.sensitivities(line.PressedLine(**inputs | {"frequency_hz": tones}), of=names)
-    got = {name: value[:, 0, 0] for name, value in solve(STRIP, [PAIR], tones, press, of=BY, cells=80).by.items()}
-    force, strain = inputs["force_n"], 1 - 1 / press.capacitance_factor
-    assert got["x_m"] == pytest.approx(by["left_m"], rel=1e-3)
-    assert -got["capacitance_factor"] / (1 - strain) ** 2 * strain / inputs["modulus_pa"] == pytest.approx(
-        by["modulus_pa"], rel=1e-3
-    )
-    for end in ("top", "bottom"):
-        near = (
-            1e-3 * np.abs(by[f"{end}_piezoresistance_per_n"]).max()
-        )  # at the far end, where no current is, there is little to see
-        assert got[f"{end}_resistance_factor"] * force == pytest.approx(
-            by[f"{end}_piezoresistance_per_n"], abs=10 * near
-        )
-    assert np.abs(got["y_m"]).max() < 1e-9 * np.abs(got["x_m"]).max()
-
-
 @pytest.mark.parametrize(("s_n", "least", "worst"), [(0.0, 1.7, 1e-3), (0.005, 0.7, 0.15)])
 def test_the_derivative_by_place_converges_wherever_the_patch_lies(s_n, least, worst):
     """In second order; in first where the sheets change too, since current and voltage then bend under the edge."""
