@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 from line_cases import cases
+from resistors import ladder, potentials
 
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models import line, stack
@@ -182,25 +183,10 @@ def test_sections_of_no_length_and_cuts_change_nothing():
 
 def nodal(r, y, length, cells, ends):
     """Impedance of a ladder of resistors and capacitors, by Kirchhoff's law at each node."""
-    n, step = len(r), length / cells
-    size = n * (cells + 1)
-    g = np.zeros((size, size), complex)
-
-    def join(a, b, value):
-        g[[a, b], [a, b]] += value
-        g[[a, b], [b, a]] -= value
-
-    for cell in range(cells + 1):
-        for k in range(n - 1):
-            join(n * cell + k, n * cell + k + 1, y[k] * step * (0.5 if cell in (0, cells) else 1.0))
-        for k in range(n if cell < cells else 0):
-            join(n * cell + k, n * (cell + 1) + k, 1 / (r[k] * step))
-    current = np.zeros(size, complex)
-    current[ends[0]], current[ends[1]] = 1.0, -1.0
-    kept = np.arange(1, size)  # the first node is at 0
-    potential = np.zeros(size, complex)
-    potential[kept] = np.linalg.solve(g[np.ix_(kept, kept)], current[kept])
-    return potential[ends[0]] - potential[ends[1]]
+    held = np.full(len(r) * (cells + 1), np.nan)
+    held[list(ends)] = 1.0, 0.0
+    _, current = potentials(*map(np.array, zip(*ladder(r, y, length, cells), strict=True)), held)
+    return 1 / current[ends[0]]
 
 
 @pytest.mark.parametrize("ends", [(1, 0), (2, 1), (2, 0)])
