@@ -360,13 +360,6 @@ def test_files_of_both_kinds_say_the_same(tmp_path, model):
     assert np.isnan(other.siemens.real).all()
     assert np.argwhere(np.isnan(other.siemens.imag)).tolist() == [[4, 1, 1]]
     assert np.nan_to_num(other.siemens.imag[:4]) == pytest.approx(one.siemens.imag[:4])
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(tmp_path / "f.h5", "w") as file:
-        for key, values in np.load(tmp_path / "f.npz").items():
-            file[key] = values
-    third = read(tmp_path / "f.h5", (5, 6), None)
-    assert np.array_equal(third.siemens, one.siemens)
-    assert third.rest.tolist() == one.rest.tolist()
 
 
 @pytest.mark.parametrize(

@@ -82,26 +82,15 @@ def test_at_low_frequency_it_is_a_third_of_the_resistance_before_a_capacitor():
 def test_arrays_broadcast_and_blocks_make_no_difference(monkeypatch):
     from sensorgen.solvers.line import inputs as _line_inputs
 
-    grid = PLATE | {
-        "frequency_hz": np.array(TONES)[:, None, None],
-        "force_n": np.linspace(-2, 6, 11)[:, None],
-        "left_m": np.linspace(0, 0.09, 13),
-        "far_end": "open",
-    }
-    whole = impedance(PressedLine(**grid))
-    slopes = sensitivities(PressedLine(**grid))[1]
+    tones, force, left = np.array(TONES)[:, None, None], np.linspace(-2, 6, 11)[:, None], np.linspace(0, 0.09, 13)
+    grid = PressedLine(**PLATE | {"frequency_hz": tones, "force_n": force, "left_m": left, "far_end": "open"})
+    whole, slopes = impedance(grid), sensitivities(grid)[1]["force_n"]
     assert whole.shape == (7, 11, 13)
     monkeypatch.setattr(_line_inputs, "BLOCK", 20)
     for part in (np.real, np.imag):
-        np.testing.assert_allclose(part(impedance(PressedLine(**grid))), part(whole), rtol=1e-14)
-        np.testing.assert_allclose(
-            part(sensitivities(PressedLine(**grid))[1]["force_n"]), part(slopes["force_n"]), rtol=1e-12
-        )
-    one = PLATE | {
-        "frequency_hz": TONES[3],
-        "force_n": np.linspace(-2, 6, 11)[4],
-        "left_m": np.linspace(0, 0.09, 13)[7],
-    }
+        np.testing.assert_allclose(part(impedance(grid)), part(whole), rtol=1e-14)
+        np.testing.assert_allclose(part(sensitivities(grid)[1]["force_n"]), part(slopes), rtol=1e-12)
+    one = PLATE | {"frequency_hz": TONES[3], "force_n": force[4, 0], "left_m": left[7]}
     assert impedance(PressedLine(**one)) == pytest.approx(whole[3, 4, 7], rel=1e-14)
     assert impedance(PressedLine(**PLATE | {"frequency_hz": []})).shape == (0,)
 
