@@ -2,18 +2,7 @@
 
 import numpy as np
 import pytest
-from skfem import (
-    Basis,
-    BilinearForm,
-    ElementQuad2,
-    ElementVector,
-    FacetBasis,
-    LinearForm,
-    MeshQuad,
-    asm,
-    condense,
-    solve,
-)
+import skfem
 from skfem.helpers import ddot, sym_grad, trace
 from skfem.models.elasticity import lame_parameters
 
@@ -32,37 +21,37 @@ PITCH_M = 5e-3
 def by_elements(layer, spring, squares=9, fine=12, thick=6):
     """Mean pressures on springs under each pitch, for 1 Pa on the middle one."""
     half = squares * PITCH_M / 2
-    mesh = MeshQuad.init_tensor(
+    mesh = skfem.MeshQuad.init_tensor(
         np.linspace(-half, half, squares * fine + 1), np.linspace(0, layer.thickness_m, thick + 1)
     )
-    basis = Basis(mesh, ElementVector(ElementQuad2()))
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementQuad2()))
     lam, mu = lame_parameters(layer.youngs_modulus_pa, layer.poisson_ratio)
 
-    @BilinearForm
+    @skfem.BilinearForm
     def stress(u, v, w):
         return 2 * mu * ddot(sym_grad(u), sym_grad(v)) + lam * trace(sym_grad(u)) * trace(sym_grad(v))
 
-    @BilinearForm
+    @skfem.BilinearForm
     def springs(u, v, w):
         return spring * u[1] * v[1]
 
-    @LinearForm
+    @skfem.LinearForm
     def load(v, w):
         return -1.0 * (np.abs(w.x[0]) < PITCH_M / 2) * v[1]
 
-    low, high = (FacetBasis(mesh, basis.elem, facets=mesh.facets_satisfying(lambda x, z=z: np.isclose(x[1], z)))
+    low, high = (skfem.FacetBasis(mesh, basis.elem, facets=mesh.facets_satisfying(lambda x, z=z: np.isclose(x[1], z)))
                  for z in (0.0, layer.thickness_m))  # fmt: skip
     fixed = basis.get_dofs(lambda x: np.isclose(x[0], 0) & np.isclose(x[1], 0)).all("u^1")
-    u = solve(*condense(asm(stress, basis) + asm(springs, low), asm(load, high), D=fixed))
+    u = skfem.solve(*skfem.condense(skfem.asm(stress, basis) + skfem.asm(springs, low), skfem.asm(load, high), D=fixed))
 
     def mean(k):
         left = -half + k * PITCH_M
 
-        @LinearForm
+        @skfem.LinearForm
         def over(v, w):
             return -spring * v[1] * ((w.x[0] > left) & (w.x[0] < left + PITCH_M)) / PITCH_M
 
-        return float(asm(over, low) @ u)
+        return float(skfem.asm(over, low) @ u)
 
     return np.array([mean(k) for k in range(squares)])
 

@@ -12,15 +12,7 @@ from sensorgen.core import document
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.array_frames import session
 from sensorgen.prediction.array import sessions as calibration
-from sensorgen.prediction.array.elements import (
-    ArraySession,
-    LawForm,
-    Past,
-    behind,
-    doubtful_time,
-    flickering,
-    lagged,
-)
+from sensorgen.prediction.array.elements import ArraySession, LawForm, Past, behind, doubtful_time, flickering, lagged
 from sensorgen.prediction.array.sessions import calibrated, law_of, median_error, stored, study
 
 PRINT = Insole(elements=20, bad=6, minutes=4.0, rate_hz=1.0)
@@ -171,14 +163,6 @@ def test_noise_of_readings_does_not_flatten_the_law():
     assert np.mean(plain) == pytest.approx(gain * factor, rel=0.02)
     law = law_of([one], LawForm(powers=1))
     assert (law.at[:, 0] / law.scale).mean() == pytest.approx(gain, rel=0.01)
-
-
-def test_terms_of_noisy_readings_are_right_on_average():
-    """Less half their bend by s^2, by 20-point Gauss-Hermite quadrature over the noise."""
-    nodes, weights = np.polynomial.hermite_e.hermegauss(20)
-    x, s, form = np.full((20, 1), 0.7) + 0.3 * nodes[:, None], 0.3, LawForm()
-    terms = form.basis(x, np.arange(20.0)) - s**2 / 2 * form.derivatives(x)[1]
-    assert (weights / weights.sum()) @ terms[:, 0] == pytest.approx(0.7 ** np.arange(1, 4))
 
 
 def test_an_element_without_data_takes_the_print_s_gain():
@@ -406,14 +390,8 @@ def test_files_of_every_reference(tmp_path):
     plate = session(table(tmp_path / "f.csv", ["time_s", "heel", "toe", "force_n"], [(0, 1, 2, 0), (1, 1, 3, 5)]), 1)
     assert np.isnan(plate.pressure_kpa).all()
     assert plate.force_n.tolist() == [0, 5]
-    np.savez(
-        tmp_path / "n.npz",
-        reading=np.ones((2, 3, 4)),
-        time_s=[0, 1],
-        pressure_kpa=[0.0, 5.0],
-        element=[0, 12],
-        area_mm2=20.0,
-    )
+    given = {"reading": np.ones((2, 3, 4)), "time_s": [0, 1], "pressure_kpa": [0.0, 5.0], "element": [0, 12]}
+    np.savez(tmp_path / "n.npz", **given, area_mm2=20.0)
     packed = session(tmp_path / "n.npz", 2)
     assert packed.reading.shape == (2, 12)
     assert np.nan_to_num(packed.pressure_kpa[1]).tolist() == [0] * 11 + [5]

@@ -56,11 +56,7 @@ def test_raw_and_ready_files_are_one_print(made):
 
 @pytest.mark.parametrize(
     "place",
-    [
-        lambda x, y: (x + 37.3, y - 21.2),
-        lambda x, y: (-y, x),
-        lambda x, y: (-y + 40, x - 15),
-    ],
+    [lambda x, y: (x + 37.3, y - 21.2), lambda x, y: (-y, x), lambda x, y: (-y + 40, x - 15)],
     ids=["moved", "turned", "both"],
 )
 def test_it_is_found_wherever_it_stands(made, place, tmp_path):

@@ -86,11 +86,6 @@ def test_overlapping_bodies_are_seen(depth):
     assert found(scene) == [("low / film", f"overlap by {16 * depth:.3g} mm3")]
 
 
-def test_a_body_within_another_is_seen():
-    ((pair, _),) = found(two_plates(FILM, Body("grain", "pla", (box(1, 2, 1, 2, 0.35, 0.45),))))
-    assert pair == "film / grain"
-
-
 def test_prisms_of_one_body_that_overlap_are_seen():
     """Two triangles of base 2 and height 1 whose bases share 1: they share a triangle of area 0.25, 4 deep."""
     teeth = tuple(Prism("y", ((x, 0.3), (x + 2, 0.3), (x + 1, 1.3)), 0.0, 4.0) for x in (0.0, 1.0))

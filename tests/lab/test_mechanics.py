@@ -6,13 +6,7 @@ import pytest
 from sensorgen.core.errors import BadInput
 from sensorgen.core.records import checked
 from sensorgen.design.design import make
-from sensorgen.measure.virtual.mechanics import (
-    OPEN_OHM,
-    Mechanics,
-    VirtualRig,
-    VirtualSpecimen,
-    rig_of,
-)
+from sensorgen.measure.virtual.mechanics import OPEN_OHM, Mechanics, VirtualRig, VirtualSpecimen, rig_of
 from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, drawn
 
 DESIGN = make({"shape": "reference"})

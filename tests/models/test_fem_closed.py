@@ -87,21 +87,5 @@ def test_eccentric_cylinders_are_met_with_the_square_of_their_corners(apart):
     assert errors[0] / errors[1] > 3.9
 
 
-def test_confocal_ellipses():
-    """Between confocal ellipses C = 2 pi eps0 / (mu2 - mu1); drawn by curves over x it is a quarter of that."""
-    hyper = lambda mu, nu: (np.cosh(mu) * np.cos(nu), np.sinh(mu) * np.sin(nu))  # noqa: E731
-    errors = []
-    for corners in (6, 12):
-        nu = np.linspace(0, np.pi / 2, corners + 1)
-        inner, outer = hyper(0.4, nu), hyper(1.0, nu)
-        low = prism((0, 0), *zip(*inner, strict=True))
-        high = prism((1.7, 0), (1.7, 1.4), (0, 1.4), *list(zip(*outer, strict=True))[::-1])
-        scene = Scene((Body("l", "e", (_neat(low),), "bottom"), Body("h", "e", (_neat(high),), "top")), (1.7, 1.0, 1.4))
-        found = _open_floor(scene, VACUUM, 1e-5)
-        errors.append(found.middle() / (np.pi / 2 / 0.6 * EPS0_F_PER_M * MM) - 1)
-    assert abs(errors[1]) < 8e-3
-    assert errors[0] / errors[1] > 4
-
-
 def _neat(p):
     return replace(p, outline=tuple((round(u, 12), round(v, 12)) for u, v in p.outline))

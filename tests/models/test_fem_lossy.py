@@ -48,16 +48,6 @@ def test_whole_cells_without_losses(model, made, width):
     assert ends == close((bounds.lower, bounds.upper), 1e-8)
 
 
-@pytest.mark.parametrize("angle", [0.02, 0.7, 1.5])
-def test_a_loss_alike_everywhere_turns_the_whole(angle):
-    """Every permittivity turned by one angle: so is C, and the disc stays as it was."""
-    turn = np.exp(-1j * angle)
-    flat = fem2d.lossy(tri_cell(0.1), EPS, 1e-5)
-    found = fem2d.lossy(tri_cell(0.1), {m: e * turn for m, e in EPS.items()}, 1e-5)
-    assert found.centre == close(flat.centre * turn, 1e-9)
-    assert found.radius == close(flat.radius, 1e-4)
-
-
 def test_a_small_loss_is_the_slope_of_the_lossless():
     """Im C = -tan delta eps dC/deps to first order, by differences of certified values."""
     delta, step = 1e-3, 1e-2

@@ -19,9 +19,7 @@ ISLANDS = {
     "one": plates(SLAB, bars("i", "top", (0.5, 0.9, 0.5, 0.8), (1.3, 1.5, 0.6, 0.7))),
     "of both": plates(SLAB, bars("i", "bottom", (0.3, 0.8, 0.8, 1.0)), bars("j", "top", (1.2, 1.7, 0.5, 0.7))),
     "in a row": plates(
-        SLAB,
-        bars("i", "bottom", (0.3, 0.8, 0.8, 1.0)),
-        bars("j", "top", (0.4, 0.9, 0.5, 0.7), (1.3, 1.5, 0.6, 0.7)),
+        SLAB, bars("i", "bottom", (0.3, 0.8, 0.8, 1.0)), bars("j", "top", (0.4, 0.9, 0.5, 0.7), (1.3, 1.5, 0.6, 0.7))
     ),
     "that touch at a corner": plates(SLAB, bars("i", "top", (0.4, 0.8, 0.5, 0.7), (0.8, 1.2, 0.7, 0.9))),
     "that touch at two": plates(

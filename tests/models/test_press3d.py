@@ -16,12 +16,7 @@ from sensorgen.models import fem2d, fem3d, press2d, press3d, springs
 from sensorgen.models.press3d import BoundaryConditions, BrickCounts, Elastic
 from sensorgen.prediction.mesh_ladder import limit
 from sensorgen.scene.scene import Body, Scene, box
-from sensorgen.solvers.contact import (
-    contact,
-    element,
-    factors,
-    mapped_field,
-)
+from sensorgen.solvers.contact import contact, element, factors, mapped_field
 from sensorgen.solvers.contact import mapped_field as air
 from sensorgen.solvers.contact.bricks import Bricks, mesh_of
 from sensorgen.solvers.contact.cell import Region

@@ -80,10 +80,3 @@ def test_a_bonded_strip_is_as_stiff_as_gent_and_lindley_say(thick, stiffer):
     *_, state = load.curve(problem, [0.0, 1e-3], 1.0)
     strain = problem.load @ state.u_m / np.abs(problem.load).sum() / thick
     assert 1e-3 / strain == pytest.approx(stiffer, rel=0.06)
-
-
-def test_an_even_pressure_moves_a_confined_block_evenly():
-    mesh = grid(3, 3, bend=0.08)
-    _, state = pressed(mesh, 6.0, 0.4, boundary.BoundaryConditions("sliding", "fixed", "even"), 1.0)
-    top = state.u_m[1::2][mesh.points_m[:, 1] == 1.0]
-    assert top == pytest.approx(np.full_like(top, top[0]), rel=1e-6)
