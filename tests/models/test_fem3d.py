@@ -9,7 +9,6 @@ from cell_scenes import CELLS, EPS, MM, close, cut_slabs, plates, rect_cell, sta
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
-from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import rect
 from sensorgen.models import columns, fem3d
 from sensorgen.scene.scene import Body, Fill, Scene, box
@@ -36,13 +35,6 @@ def test_rungs_lie_within_each_other(rungs):
         bounds = [(s.interval.lower, s.interval.upper) for s in steps]
         assert sorted(bounds) == bounds
         assert [u for _, u in bounds] == sorted((u for _, u in bounds), reverse=True)
-
-
-def test_layers_of_plates_are_exact():
-    scene = plates(Body("a", "a", (box(0, 2, 0, 1, 0.2, 0.6),)), Body("b", "b", (box(0, 2, 0, 1, 0.6, 1.2),)))
-    found = fem3d.capacitance(scene, {"a": 3.0, "b": 7.0, "air": 1.0}, 1e-8)
-    exact = EPS0_F_PER_M * 2 / (0.4 / 3 + 0.6 / 7) * MM
-    assert (found.lower, found.upper) == close((exact, exact), 2e-9)
 
 
 def test_stairs_as_the_cross_section_has_them():
@@ -174,28 +166,6 @@ def test_a_sensor_that_the_end_cuts_in_both_directions_as_voxels_have_it():
     all_of_it, one = (next(fem3d.steps(s, EPS)).interval.middle() for s in (scene, whole))
     assert all_of_it / one * 4 == close(ratio, 1e-3)
     assert all_of_it / one * 4 != close(1000 / 1.1**2, 3e-3)  # by area alone it would not be caught
-
-
-@pytest.mark.parametrize(
-    ("first", "width", "meshes"),
-    [(1.0, 1.4e-3, [0, 1, 2]), (2.0, 1e-3, [0, 3, 4]), (2.0, 1e-9, [0, 8]), (0.1, 1e-3, [0])],
-)
-def test_meshes_that_are_not_expected_to_do_are_left_out(first, width, meshes, monkeypatch):
-    """Widths as on rect times some factor; every second mesh does 20 % worse than expected."""
-    used = []
-
-    def bounds(_) -> Interval:
-        mesh = fem3d.MESHES[meshes[len(used)]]
-        used.append(mesh)
-        reached = mesh.width * first * 1.2 ** ((len(used) - 1) % 2)
-        return Interval(1 - reached / 2, 1 + reached / 2)
-
-    coarse = grid(plates(Body("a", "a", (box(0, 2, 0, 1, 0.2, 1.2),))))
-    found = [m for m, *_ in fem3d.narrowed(bounds, coarse, [0.0, 0.0, 1.0], width)]
-    assert found == used == [fem3d.MESHES[k] for k in meshes]
-    used.clear()
-    monkeypatch.setattr(fem3d, "_MOST_UNKNOWNS", 1)
-    assert [m for m, *_ in fem3d.narrowed(bounds, coarse, [0.0, 0.0, 1.0], width)] == [fem3d.MESHES[0]]
 
 
 @pytest.mark.parametrize("least", [0.0, 1.0, 4.0])

@@ -12,7 +12,7 @@ from scipy.sparse import csr_matrix
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import make
-from sensorgen.models import fem2d, fem3d, press2d, press3d, springs
+from sensorgen.models import fem2d, press2d, press3d, springs
 from sensorgen.models.press3d import BoundaryConditions, BrickCounts, Elastic
 from sensorgen.prediction.mesh_ladder import limit
 from sensorgen.scene.scene import Body, Scene, box
@@ -137,18 +137,6 @@ def test_bounds_hold_the_reference_and_close_in():
 def unmoved(bricks, orders):
     mesh = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
     return mapped_field.MappedField(mesh, EPS, orders).capacitance(np.zeros(3 * len(mesh.points_m)))
-
-
-def test_a_thinner_film_by_displacement_is_one_by_drawing():
-    """Everything above the film lowered by 20 um, the film thinned alike: another solver on the drawn cell agrees."""
-    bricks = press3d.cell(rect(0.1)).cut(2, 0.3)
-    mesh = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
-    u = np.zeros((len(mesh.points_m), 3))
-    u[:, 2] = -20e-6 * np.clip((mesh.points_m[:, 2] - 0.3e-3) / 0.1e-3, 0, 1)
-    moved = mapped_field.MappedField(mesh, EPS, FieldOrders()).capacitance(u.ravel())
-    drawn = fem3d.capacitance(rect(0.08), EPS, 1e-2).times(1 / 1e-3)
-    assert max(moved.lower, drawn.lower) < min(moved.upper, drawn.upper)
-    assert moved.middle() == pytest.approx(drawn.middle(), rel=4e-3)
 
 
 def test_bounds_from_the_factors_of_an_earlier_load_hold_those_of_new_ones(monkeypatch):

@@ -168,19 +168,6 @@ def test_one_perfect_sheet_leaves_the_other(side):
     assert twin == pytest.approx(z) if not side else np.isfinite(twin).all()
 
 
-@pytest.mark.parametrize(
-    "ports", [MIXED, [(SQUARE.edge("top", "left", 0.0, 0.02), SQUARE.edge("bottom", "left", 0.06, 0.08))]]
-)
-def test_turned_upside_down_and_with_ports_reversed(ports):
-    other = {"top": "bottom", "bottom": "top"}
-    flipped = [tuple(replace(c, side=other[c.side]) for c in port)[::-1] for port in ports]
-    film = replace(SQUARE, sheet_resistance_ohm=SQUARE.sheet_resistance_ohm[::-1])
-    for factors in ((1.2, 1.1), (1.2, 1.2)):
-        press, turned = (replace(TIP, resistance_factor=f) for f in (factors, factors[::-1]))
-        z = impedance(SQUARE, ports, 1e5, press, cells=20)
-        assert impedance(film, flipped, 1e5, turned, cells=20) == pytest.approx(z, rel=1e-9)
-
-
 def test_sheets_that_change_differently_are_not_folded():
     inputs, press = strip_press(0.043, 1.4, 0.005)
     press = replace(press, resistance_factor=(press.resistance_factor[0], 1.0))

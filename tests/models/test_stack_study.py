@@ -59,11 +59,6 @@ def test_bare_and_isolated_touches_are_capacitors_in_a_row():
         assert abs(shift) == pytest.approx(aside / (film + aside), rel=2e-3)
 
 
-def test_grounding_the_top_takes_most_of_it_away():
-    driven, ground, bridge = (abs(touching().force_n(0.1, w)) for w in WIRINGS)
-    assert driven > 500 * max(ground, bridge)
-
-
 @pytest.mark.parametrize("wiring", WIRINGS, ids=lambda w: w.words)
 def test_the_needed_thickness_is_where_the_error_meets_the_limit(wiring):
     found, limit = touching(), 0.05
