@@ -445,6 +445,10 @@ def test_commands_calibrate_and_invert_any_array(tmp_path):
     found = np.genfromtxt(lines[1:], delimiter=",")[:, 1::2]
     assert np.nanmedian(np.abs(found - later[3][:, None])) < 15
     assert np.isnan(found).all(0).sum() == 2
+    late = later[2] + 60 * np.exp(-later[1] / 100)[:, None]
+    np.savez(tmp_path / "late.npz", reading=late, time_s=later[1], rest=later[3] == 0, day=3.0)
+    _, text = run(tmp_path, "invert", "c.npz", "late.npz", "-o", "late.csv")
+    assert "late.npz: doubtful: readings at rest fall by" in text
     rows = [[t, 3.0, *("" if k == 7 else v for k, v in enumerate(c))] for t, c in zip(later[1], later[2], strict=True)]
     table(tmp_path / "l.csv", ["time_s", "day", *"hgfedcba"], [[*row[:2], *row[:1:-1]] for row in rows])
     rest = (later[3] == 0).astype(int)

@@ -116,3 +116,7 @@ def test_crossed_strips_are_one_shell_and_separate_strips_are_many():
     scene = rect.scene(rect.Params(length_mm=8.0, width_mm=4.0), Fill())
     assert second_program(mesh(scene.body("top_electrode_with_cogs"))).body_count == 1
     assert second_program(mesh(scene.body("hanging_dielectric"))).body_count == 2  # one per period over the width
+
+
+def test_an_empty_mesh_has_no_volume():
+    assert Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)).volume_mm3() == 0.0

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from sensorgen.core import lazy as registry
-from sensorgen.core.errors import CadFailed
+from sensorgen.core.errors import CadFailed, Unwritable
 from sensorgen.design import shapes
 from sensorgen.scene.geometry import solids
 from sensorgen.scene.polyhedra import Loft
@@ -267,7 +267,9 @@ def colour_blocks(bodies: list[tuple[int, str]]) -> bytes:
     return "".join(lines).encode()
 
 
-def test_no_colour_no_body(kernel: ModuleType, tmp_path: Path) -> None:
+def test_no_folder_no_colour_no_body(kernel: ModuleType, tmp_path: Path) -> None:
+    with pytest.raises(Unwritable, match=r"nowhere/a\.step.*No such file"):
+        solids.write_step(one_box(), {"film": "#f0e6d2"}, "t", tmp_path / "nowhere" / "a.step")
     with pytest.raises(CadFailed, match="'film' has no colour; colours are given for: foil"):
         solids.write_step(one_box(), {"foil": "#f0e6d2"}, "t", tmp_path / "a.step")
     with pytest.raises(CadFailed, match="'t' has no bodies"):

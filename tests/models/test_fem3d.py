@@ -168,6 +168,28 @@ def test_a_sensor_that_the_end_cuts_in_both_directions_as_voxels_have_it():
     assert all_of_it / one * 4 != close(1000 / 1.1**2, 3e-3)  # by area alone it would not be caught
 
 
+@pytest.mark.parametrize(
+    ("first", "width", "meshes"),
+    [(1.0, 1.4e-3, [0, 1, 2]), (2.0, 1e-3, [0, 3, 4]), (2.0, 1e-9, [0, 8]), (0.1, 1e-3, [0])],
+)
+def test_meshes_that_are_not_expected_to_do_are_left_out(first, width, meshes, monkeypatch):
+    """Widths as on rect times some factor; every second mesh does 20 % worse than expected."""
+    used = []
+
+    def bounds(_) -> Interval:
+        mesh = fem3d.MESHES[meshes[len(used)]]
+        used.append(mesh)
+        reached = mesh.width * first * 1.2 ** ((len(used) - 1) % 2)
+        return Interval(1 - reached / 2, 1 + reached / 2)
+
+    coarse = grid(plates(Body("a", "a", (box(0, 2, 0, 1, 0.2, 1.2),))))
+    found = [m for m, *_ in fem3d.narrowed(bounds, coarse, [0.0, 0.0, 1.0], width)]
+    assert found == used == [fem3d.MESHES[k] for k in meshes]
+    used.clear()
+    monkeypatch.setattr(fem3d, "_MOST_UNKNOWNS", 1)
+    assert [m for m, *_ in fem3d.narrowed(bounds, coarse, [0.0, 0.0, 1.0], width)] == [fem3d.MESHES[0]]
+
+
 @pytest.mark.parametrize("least", [0.0, 1.0, 4.0])
 def test_a_part_lies_where_any_flux_so_near_has_it(least):
     """Fluxes of a few numbers, without a second pair of fields: the worst is met."""
