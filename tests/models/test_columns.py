@@ -1,4 +1,4 @@
-"""Bounds of the capacitance against finite elements, closed forms, quadrature, limits and symmetries.
+"""Bounds of the capacitance against finite elements, closed forms and quadrature.
 
 Unless noted: default sizes, X60 4.68, air 1.00059; see models-cells.md.
 """

@@ -1,4 +1,4 @@
-"""Bounds of upright pillars of any outline: the same scene told as boxes, closed forms, limits, a field solver."""
+"""Bounds of upright pillars of any outline: closed forms, a field solver, springs of the same boxes."""
 
 from dataclasses import replace
 from math import cos, pi, sin, tau

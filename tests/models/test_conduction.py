@@ -1,4 +1,4 @@
-"""Electrodes with cogs: closed forms, scikit-fem, limits, bricks beside triangles, planted faults, bad input."""
+"""Electrodes with cogs: closed forms, scikit-fem, bricks beside triangles, planted faults, bad input."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Cells of a cross-section between two bounds: references, scikit-fem, symmetries, scenes of all kinds, bad input."""
+"""Cells of a cross-section between two bounds: references, scenes of all kinds, bad input."""
 
 from itertools import pairwise
 

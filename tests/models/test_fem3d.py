@@ -1,4 +1,4 @@
-"""Boxes between two bounds: references, the cross-section's elements, limits, symmetries, the solver by itself."""
+"""Boxes between two bounds: references, the cross-section's elements, voxels, ends amid a cell, bad input."""
 
 import subprocess
 import sys

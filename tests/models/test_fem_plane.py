@@ -1,4 +1,4 @@
-"""The plane's solver: against NGSolve on the same triangles, exact fields, islands, pieces that touch."""
+"""The plane's solver: against NGSolve on the same triangles, and bricks; islands, pieces that touch."""
 
 import subprocess
 import sys

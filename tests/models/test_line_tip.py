@@ -1,4 +1,4 @@
-"""A tip that presses unevenly: against mpmath, against one patch, its balance of force, and how its pieces converge."""
+"""A tip that presses unevenly: against mpmath, against one patch, and how its pieces converge."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Electrodes that do not cover the sensor: against Kirchhoff's disc, resistor networks on voxels, and thin films."""
+"""Electrodes that do not cover the sensor: against Kirchhoff's disc, and resistor networks on voxels."""
 
 import importlib.util
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The triangles alone: closed forms, tangent against differences, patch test, locking."""
+"""The triangles alone: closed forms, tangent and energy against differences, locking."""
 
 import numpy as np
 import pytest

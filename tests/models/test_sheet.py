@@ -1,4 +1,4 @@
-"""The sheet against closed forms, the one-dimensional line, limits and symmetries."""
+"""The sheet against closed forms, the one-dimensional line and its limits."""
 
 from dataclasses import replace
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""Bounds of force and place: against the line's, against a plain inverse, and by symmetry."""
+"""Bounds of force and place: against the line's, and against a plain inverse."""
 
 import re
 from dataclasses import replace
