@@ -5,11 +5,10 @@ import itertools
 import mpmath
 import numpy as np
 import pytest
-from line_cases import PLATE, TONES, exact, off, product, terminated
+from line_cases import PLATE, exact, off, product, terminated
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models.line import PressedLine, cascade, impedance, sensitivities
-from sensorgen.solvers.line.inputs import BLOCK, blocks
 
 FREQUENCIES = np.geomspace(1e-9, 1e9, 37)
 
@@ -126,15 +125,6 @@ def test_the_sample_that_does_not_fit_is_found_whatever_varies(change, words):
         impedance(PressedLine(**PLATE | {key: np.asarray(value) for key, value in change.items()}))
 
 
-def test_blocks_are_as_small_as_their_largest_input_asks():
-    whole = (slice(0, 4), slice(0, BLOCK))
-    assert next(blocks(whole, [(4, 1), (BLOCK,)])) == (slice(0, 1), slice(0, BLOCK // 4))
-    covered = np.zeros((4, 3 * BLOCK // 2), int)
-    for part in blocks((slice(0, 4), slice(0, 3 * BLOCK // 2)), [(4, 1)]):
-        covered[part] += 1
-    assert (covered == 1).all()
-
-
 def test_a_patch_may_end_at_the_end_by_rounding_only():
     """0.1 * 3 + 0.1 * 7 is not 1: the patch may pass the end by as much as decimals do."""
     inputs = PLATE | {"length_m": 1.0, "left_m": 0.1 * 3, "tip_m": 0.7 * (1 + 3e-16)}
@@ -152,17 +142,6 @@ def test_no_sections_are_the_far_end():
 def test_thousands_of_sections_do_not_overflow(size):
     line = cascade(np.full(3000, size), np.full(3000, 1j), np.full(3000, 10.0))
     assert line == pytest.approx(np.sqrt(size / 1j), rel=1e-12)
-
-
-def test_some_derivatives_are_what_all_of_them_are():
-    grid = PLATE | {
-        "frequency_hz": np.array(TONES)[:, None],
-        "force_n": np.linspace(0.1, 6, 5),
-        "top_piezoresistance_per_n": 0.01,
-    }
-    everything = sensitivities(PressedLine(**grid))[1]
-    for name, value in everything.items():
-        np.testing.assert_array_equal(sensitivities(PressedLine(**grid), of=[name])[1][name], value)
 
 
 def test_a_film_that_conducts_all_over_is_a_loss_tangent():

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from cell_scenes import CELLS, EPS, MM, close, rect_cell, tri_cell
+from cell_scenes import CELLS, EPS, MM, close, rect_cell
 from scipy.integrate import quad
 
 from sensorgen.core.errors import OutOfRange
@@ -68,13 +68,6 @@ def test_strips_of_their_own_widths_are_the_columns(heights):
     found = columns.capacitance(rect_cell(0.1, **heights), EPS | {"air": 1.0})
     own = thesis_cells.strips_f_per_m2(rect.Params(dielectric_mm=0.1, **heights), 4.68, even=False) * (2 * MM) ** 2
     assert own == close(found.lower, 1e-9)
-
-
-def test_triangles_are_the_columns():
-    found = columns.capacitance(tri_cell(0.1), EPS | {"air": 1.0})
-    assert thesis_cells.triangles_f_per_m2(tri.Params(dielectric_mm=0.1), 4.68) * 2 * MM * MM == close(
-        found.lower, 1e-9
-    )
 
 
 def test_bulging_vanishes_at_rest_when_corrected():
