@@ -314,6 +314,15 @@ def test_a_block_that_bulges_to_a_mirror_meets_its_image():
     assert moved[2] < 0.65 * moved[0]
 
 
+def test_gaps_are_runs_of_air_between_solids_along_each_axis():
+    fill = np.array([[[1, 0, 1, 1]], [[1, 0, 0, 1]], [[0, 0, 0, 1]]])
+    found = {axis: (below.tolist(), above.tolist()) for axis, below, above in air.facing(fill)}
+    assert found[2] == ([[0, 0, 0], [1, 0, 0]], [[0, 0, 2], [1, 0, 3]])
+    assert found[0] == found[1] == ([], [])
+    slot = np.array([[[1]], [[0]], [[2]]])
+    assert [len(below) for _, below, _ in air.facing(slot)] == [1, 0, 0]
+
+
 def test_moduli_scale_and_incompressible_is_the_limit():
     cell = press3d.cell(rect())
     one = press3d.press(cell, solids(), [0.0, 2e4], fineness=BrickCounts(1))
