@@ -125,11 +125,13 @@ def test_high_ratios_of_permittivity_at_a_sharp_wedge(ratio):
     assert scaled.middle() * ratio == close(fine.middle(), 1e-8)
 
 
-def test_it_needs_numpy_only():
+def test_it_needs_numpy_only_and_bricks_neither_ngsolve_nor_the_cad_kernel():
     code = (
         "import sys\nfrom sensorgen.models import fem2d\nfrom sensorgen.design.shapes import tri\n"
         "from sensorgen.scene.scene import Fill\n"
         "fem2d.capacitance(tri.scene(tri.Params(length_mm=2.0), Fill()), {'x60': 4.68, 'air': 1.0}, 1e-6)\n"
-        "assert not {'ngsolve', 'netgen', 'scipy', 'build123d'} & set(sys.modules), sorted(sys.modules)"
+        "assert not {'ngsolve', 'netgen', 'scipy', 'build123d'} & set(sys.modules), sorted(sys.modules)\n"
+        "from sensorgen.models import fem3d, columns\n"
+        "assert not {'ngsolve', 'netgen', 'build123d', 'OCP'} & set(sys.modules), sorted(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
