@@ -3,14 +3,12 @@
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 from cell_scenes import EPS, bars, bumps, close, few_rings, plates, prism, slab, stairs, tri_cell
 
 from sensorgen.models import fem2d, fem3d
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.electrostatics import bounds
-from sensorgen.solvers.electrostatics.plane import Cone, RingLayout, condensed, ring_corners
 
 SLAB = slab()
 ISLANDS = {
@@ -87,30 +85,6 @@ def test_islands_of_electrode_as_bricks_have_them(name):
     flat, bricks = fem2d.capacitance(ISLANDS[name], EPS, 1e-4), fem3d.capacitance(ISLANDS[name], EPS, 5e-3)
     assert flat.width() <= 1e-4
     assert bricks.lower < flat.lower < flat.upper < bricks.upper
-
-
-def test_values_inside_a_cone_have_its_energy():
-    """From the outermost rim back to every triangle, for a fan between mirrors, held at one side, and all around."""
-    random, order = np.random.default_rng(3), 4
-    for turns, closed, ends in (
-        ([0.0, 0.9, 1.7], False, (False, False)),
-        ([0.0, 0.9, 1.7], False, (False, True)),
-        ([0.0, 1.2], False, (True, True)),
-        ([0.0, 2.0, 4.0], True, (False, False)),
-    ):
-        spokes = np.column_stack([np.cos(turns), np.sin(turns)])
-        ring = np.vstack([spokes, spokes[:1]])
-        sectors = len(spokes) if closed else len(spokes) - 1
-        tips = np.stack([np.zeros((sectors, 2)), ring[:sectors], ring[1 : sectors + 1]], axis=1)
-        eps = random.uniform(1, 5, sectors)[:, None, None]
-        rings = condensed(ring_corners(tips), order).reshape(sectors, 2, 12, 12) * eps[:, None]
-        cone = Cone.of(RingLayout.of(len(spokes), closed, ends, order), rings, condensed(tips, order) * eps, 3)
-        values = random.normal(size=len(cone.matrix))
-        in_rings, at_tip = cone.inside(values)
-        assert in_rings.shape[:3] == (8, sectors, 2)
-        energy = np.einsum("rstk,stkl,rstl", in_rings, rings, in_rings)
-        energy += np.einsum("sk,skl,sl", at_tip, condensed(tips, order) * eps, at_tip)
-        assert energy == close(values @ cone.matrix @ values, 1e-11)
 
 
 @pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])

@@ -212,18 +212,6 @@ def test_a_light_press_anywhere_reads_the_squared_voltage_of_the_film(size):
     assert got.by["capacitance_factor"][0, 0, 0] == pytest.approx(complex(true), rel=2e-4)
 
 
-def test_facing_contacts_are_folded_to_the_same_numbers():
-    """An unequal ratio of resistances, however little, needs both sheets: the two ways must meet."""
-    ports = [(pad("top", x, y), pad("bottom", x, y)) for x, y in ((0.0, 0.0), (0.09, 0.0), (0.05, 0.07))]
-    near = replace(TIP, resistance_factor=(1.2, 1.2 + 1e-12))
-    even = replace(TIP, resistance_factor=(1.2, 1.2))
-    one, two = (solve(SQUARE, ports, [0.0, 1e3, 1e6], press, of=BY, cells=20) for press in (even, near))
-    assert one.impedance_ohm == pytest.approx(two.impedance_ohm, rel=1e-9)
-    for name in BY:
-        scale = np.abs(two.by[name]).max()
-        assert one.by[name] / scale == pytest.approx(two.by[name] / scale, abs=1e-9)
-
-
 def test_an_array_of_capacitances_is_what_a_patch_on_its_steps_makes():
     cells = np.full((10, 8), 7e-8)
     cells[2:5, 3:4] *= 1.3

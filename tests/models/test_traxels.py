@@ -129,20 +129,6 @@ def test_lines_that_do_not_meet_conduct_nothing():
         ratio(strips(12, "y"), np.inf, (-2e-3, 2e-3))
 
 
-@pytest.mark.parametrize("angles", [(90, 0), (30, 120, 75)])
-def test_no_pieces_that_touch_are_overlooked(angles):
-    """Every pair of pieces, of one layer or of neighbouring ones, whose middles come within a width and a third."""
-    lines = plate(5.0, 4.0, W * 1e3, H * 1e3, angles)
-    share = np.linspace(0, 1, 60)[:, None]
-    points = lines.start_m[:, None] + share * (lines.end_m - lines.start_m)[:, None]
-    found = set(zip(*(side.tolist() for side in links.near(lines)), strict=True))
-    for a in range(len(lines)):
-        for b in range(a + 1, len(lines)):
-            if abs(lines.layer[a] - lines.layer[b]) <= 1 and (a, b) not in found:
-                gap = points[a][:, None] - points[b][None]
-                assert np.hypot(*gap.T).min() > 1.3 * W, (a, b)
-
-
 @pytest.mark.parametrize("contact", [0.0, 1e-6, 1e-3])
 def test_multigrid_finds_the_resistance_of_elimination(contact, monkeypatch):
     """Wide crossed layers, of some 10 000 unknowns."""
