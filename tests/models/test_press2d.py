@@ -231,6 +231,13 @@ def test_what_is_no_prism_or_no_solid_is_refused():
         press2d.press(tri(), solids(), [0.0, 1.0], boundary=BoundaryConditions(base="glued"))
 
 
+def test_work_and_energy_are_weighed():
+    """A linear spring stores half of stress times way; if it stores more or less, that is told as a share."""
+    stress = moved = np.array([0.0, 1.0, 2.0])
+    assert pressed._imbalance(stress, moved, np.array([0.0, 0.5, 2.0])) == pytest.approx([0, 0, 0], abs=1e-12)
+    assert pressed._imbalance(stress, moved, np.array([0.0, 0.5, 2.5]))[2] == pytest.approx(-0.2)
+
+
 @pytest.mark.parametrize("stiffer", [2, 5, 10])
 @pytest.mark.parametrize("closes", [42.0, 48.0, 50.0, 55.0])
 def test_a_gap_that_closes_within_a_load_step_is_no_fault(stiffer, closes):
