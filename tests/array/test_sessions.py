@@ -165,6 +165,14 @@ def test_noise_of_readings_does_not_flatten_the_law():
     assert (law.at[:, 0] / law.scale).mean() == pytest.approx(gain, rel=0.01)
 
 
+def test_terms_of_noisy_readings_are_right_on_average():
+    """Less half their bend by s^2, by 20-point Gauss-Hermite quadrature over the noise."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(20)
+    x, s, form = np.full((20, 1), 0.7) + 0.3 * nodes[:, None], 0.3, LawForm()
+    terms = form.basis(x, np.arange(20.0)) - s**2 / 2 * form.derivatives(x)[1]
+    assert (weights / weights.sum()) @ terms[:, 0] == pytest.approx(0.7 ** np.arange(1, 4))
+
+
 def test_an_element_without_data_takes_the_print_s_gain():
     """Mean and spread over the print, as of any hierarchical prior: 2.06 +- 0.11 of the other four."""
     known = made(loads(40, 2), noise=0.05)
