@@ -19,6 +19,7 @@ _Short = NDArray[np.float32]
 _PIVOT = 1e-3  # share of its column below which a pivot of an indefinite matrix is exchanged [-]
 _LEAST = 100  # unknowns that are not halved any more
 _MOST_TURNS = 30  # of conjugate gradients, before new factors are made
+_FEW_TURNS = 10  # from which on they have to be as fast as the most turns need
 _ENOUGH = 1e-4  # residual over right side: Newton's method takes the rest away [-]
 
 
@@ -121,11 +122,13 @@ def order_of(matrix: csr_matrix, places: Whole) -> Order:
     ends = np.cumsum([len(own) for own, _ in pieces])
     turned = matrix[turn][:, turn]
     fronts: list[FrontalMatrix] = []
+    coupled = np.zeros(len(turn), bool)
     for (own, children), stop in zip(pieces, ends.tolist(), strict=True):
         start = stop - len(own)
         near = [turned.indices[turned.indptr[start] : turned.indptr[stop]], *(fronts[c].outer for c in children)]
-        outer = np.unique(np.concatenate(near))
-        fronts.append(FrontalMatrix(start, stop, outer[outer >= stop].astype(np.int64), children))
+        coupled[np.concatenate(near)] = True
+        fronts.append(FrontalMatrix(start, stop, stop + np.flatnonzero(coupled[stop:]), children))
+        coupled[:] = False
     return Order(turn, fronts)
 
 
@@ -229,21 +232,27 @@ class Solver:
     places: Whole
     enough: float = _ENOUGH
     _factors: Factors | None = field(default=None, repr=False)
+    _last: tuple[Whole, Order] | None = field(default=None, repr=False)  # indices of a pattern, and its order
 
     def __call__(self, matrix: csr_matrix, right: Real) -> Real | None:
         """Solution of a positive system, or None where it is not."""
         solution = self._iterated(matrix, right)
         if solution is None:
-            self._factors = factored(matrix, order_of(matrix, self.places))
+            if not (self._last and np.may_share_memory(self._last[0], matrix.indices)):
+                self._last = matrix.indices, order_of(matrix, self.places)
+            self._factors = factored(matrix, self._last[1])
             solution = self._iterated(matrix, right)
         return solution
 
     def _iterated(self, matrix: csr_matrix, right: Real) -> Real | None:
         if self._factors is None:
             return None
-        for solution, residual, _ in iterations(matrix, right, self._factors):
-            if np.abs(residual).max() < self.enough * np.abs(right).max():
+        for turn, (solution, residual, _) in enumerate(iterations(matrix, right, self._factors), 1):
+            left = np.abs(residual).max() / np.abs(right).max()
+            if left < self.enough:
                 return solution
+            if turn >= _FEW_TURNS and left > self.enough ** (turn / _MOST_TURNS):
+                break
         return None
 
 

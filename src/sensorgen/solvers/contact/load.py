@@ -154,19 +154,25 @@ class Problem:
         return np.column_stack([slip @ places for slip in pairs.slips]) - pairs.slid_m
 
     @cached_property
-    def pattern(self) -> tuple[csr_matrix, Whole, Whole]:
-        """The elements' stiffness on the free displacements, empty; which of their entries it has, and where."""
-        number = np.full(self.free.shape[0], -1, np.int32)
+    def pattern(self) -> tuple[csr_matrix, Whole]:
+        """The elements' stiffness on the free displacements, empty; place of each of their entries in it, from 1 on.
+
+        Entries of fixed displacements have no place: 0.
+        """
+        n = self.free.shape[1]
+        number = np.full(self.free.shape[0], n, np.int32)
         number[np.diff(self.free.indptr) > 0] = self.free.indices
         here = number[self.elements.freedoms]
-        size, n = here.shape[1], self.free.shape[1]
-        rows, columns = np.repeat(here, size, axis=1).ravel(), np.tile(here, (1, size)).ravel()
-        inside = np.flatnonzero((rows >= 0) & (columns >= 0))
-        at = rows[inside], columns[inside]
-        empty = coo_matrix((np.zeros(len(inside)), at), (n, n)).tocsr()
-        # Sooner than sorting all entries: each is looked up by its number from 1 on
-        numbered = csr_matrix((np.arange(1, empty.nnz + 1), empty.indices, empty.indptr), empty.shape)
-        return empty, inside, np.asarray(numbered[at]).ravel() - 1
+        size, moves = here.shape[1], here < n
+        starts = np.append(0, np.cumsum(moves.sum(axis=1)))
+        shared = csr_matrix((np.ones(starts[-1], np.int32), here[moves], starts), (len(here), n))
+        pattern = (shared.T @ shared).tocsr()
+        pattern.sort_indices()
+        # Sooner than sorting all entries: each is looked up by its number; fixed ones are in an empty row or column
+        starts = np.append(pattern.indptr, pattern.nnz)
+        numbered = csr_matrix((np.arange(1, pattern.nnz + 1), pattern.indices, starts), (n + 1, n + 1))
+        at = np.repeat(here, size, axis=1).ravel(), np.tile(here, (1, size)).ravel()
+        return pattern, np.asarray(numbered[at]).ravel()
 
     def _springs(self, pairs: FacePairs, u: Real) -> Iterator[tuple[csr_matrix, Mask, Real]]:
         """Rows of what the contact acts on, gaps and slips, on which of them it does, and how far each is moved [m]."""
@@ -191,9 +197,9 @@ class Problem:
 
     def _linearised(self, state: State) -> Stiffness:
         """Derivative of the forces at a state."""
-        tangent, (empty, inside, place) = self.elements.tangent(state.u_m, state.inner), self.pattern
-        data = np.bincount(place, tangent.stiffness.ravel()[inside], empty.nnz)
-        whole = csr_matrix((data, empty.indices, empty.indptr), empty.shape)
+        tangent, (pattern, place) = self.elements.tangent(state.u_m, state.inner), self.pattern
+        data = np.bincount(place, tangent.stiffness.ravel(), pattern.nnz + 1)[1:]
+        whole = csr_matrix((data, pattern.indices, pattern.indptr), pattern.shape)
         for rows, acts, _ in self._springs(state.pairs, state.u_m):
             if acts.any():
                 across = rows[acts] @ self.free
