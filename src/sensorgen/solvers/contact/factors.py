@@ -7,6 +7,7 @@ stays.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import combinations_with_replacement, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -205,12 +206,15 @@ def _factored(turned: csr_matrix, order: Order, kind: type[np.floating]) -> Fact
         later = columns >= front.start
         whole[rows[later], front.local(columns[later])] = turned.data[low:high][later]
         for child in front.children:
-            at = front.local(order.fronts[child].outer)
-            whole.ravel()[len(whole) * at[:, None] + at] += rests.pop(child)  # sooner than by rows and columns
-        lower, failed = cholesky(whole[:n, :n], lower=True, clean=True)
+            at, rest = front.local(order.fronts[child].outer), rests.pop(child)
+            ends = np.flatnonzero(np.diff(at, prepend=-2, append=-2) != 1).tolist()
+            runs = [(slice(a, b), slice(place := int(at[a]), place + b - a)) for a, b in pairwise(ends)]
+            for (i, here), (j, there) in combinations_with_replacement(runs, 2):  # the upper triangle: no other is used
+                whole[here, there] += rest[i, j]
+        upper, failed = cholesky(whole[:n, :n], clean=True)
         if failed:
             return None
-        inverse = np.ascontiguousarray(inverted(lower, lower=True)[0]) if n else lower
+        inverse = inverted(upper)[0].T if n else upper
         coupling = inverse @ whole[:n, n:]
         parts.append((inverse.astype(np.float32), coupling.astype(np.float32)))
         rests[number] = whole[n:, n:] - coupling.T @ coupling
