@@ -73,7 +73,3 @@ def test_without_the_library_of_codes_it_is_said_what_to_do(monkeypatch):
     monkeypatch.setitem(sys.modules, "segno", None)
     with pytest.raises(MissingValue, match=r"pip install segno, or set 'labels: \{sheet: false\}'"):
         labelling.page(labels(), "a")
-
-
-def test_the_same_batch_gives_the_same_page():
-    assert labelling.page(labels(), "a") == labelling.page(labels(), "a")

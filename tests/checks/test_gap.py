@@ -46,14 +46,6 @@ def test_a_film_under_half_a_layer_is_an_error(sensor, findings, film_mm, severi
         assert (found[0].value_mm, found[0].limit_mm) == (pytest.approx(film_mm), 0.05)
 
 
-# "At 0.1 mm layers d = 0.02 and 0.04 are never sampled" (files-and-slicers.md).
-@pytest.mark.parametrize("film_mm", [0.02, 0.04])
-@pytest.mark.parametrize("shape", [tri, rect])
-def test_films_that_are_never_sampled_are_errors(findings, shape, film_mm):
-    scene = shape.scene(shape.Params(length_mm=8.0, width_mm=4.0, dielectric_mm=film_mm), Fill())
-    assert [f.severity for f in findings(scene, "2-film")] == ["error"]
-
-
 def side_by_side(gap_mm: float) -> Scene:
     """Two electrodes on one bed, with a film between them that stands on its edge."""
     far = 9.0 + gap_mm
