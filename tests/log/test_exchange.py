@@ -27,26 +27,12 @@ from sensorgen.measure.log.entries import ROWS, DesignRow, Withdrawal
 from sensorgen.measure.log.notes import reading
 from sensorgen.measure.log.prints import prediction
 
+TRI_X = {"shape": "tri", "axes": "X", "film_mm": 0.0}
+FACTS = '{"n": 1}'
 REMARKS = [
-    "=1+1",
-    "+1",
-    "-1",
-    "@x",
-    "'quoted",
-    "''=1",
-    "\tx",
-    "x\r\ny",
-    "\r",
-    "x\ry",
-    "\nx",
-    "＝1",
-    '"a","b"',
-    "a;b",
-    "",
-    " x ",
-    "∞",
-    "ü\u2028",
-]
+    "=1+1", "+1", "-1", "@x", "'quoted", "''=1", "\tx", "x\r\ny", "\r", "x\ry", "\nx", "＝1", '"a","b"', "a;b", "",
+    " x ", "∞", "ü\u2028",
+]  # fmt: skip
 
 
 PREDICTED = {"capacitance_f": {"lower": 1e-11, "upper": 2e-11}}
@@ -72,23 +58,11 @@ def full(log, tmp_path):
             raw,
             reading("26 triX", "1", remark="before the print bed was known", uid="unbedded"),
             Batch(uid="b", batch="26", file=raw.uid),
-            Print(
-                uid="p",
-                specimen="26 triX",
-                iteration=26,
-                shape="tri",
-                axes="X",
-                film_mm=0.0,
-                batch_uid="b",
-                design_id="d",
-                design="trix",
-            ),
+            Print(uid="p", specimen="26 triX", iteration=26, batch_uid="b", design_id="d", design="trix", **TRI_X),
             old,
             *(reading("triX .3333mm 7", "1.23456789k / OL", "0", remark=remark, baked=False) for remark in REMARKS),
             reading("26 triX", "100", supersedes=old.uid),
-            BenchRun(
-                uid="run", specimen="26 triX", written="26 triX", file=raw.uid, facts='{"n": 1}', source="=run.mat"
-            ),
+            BenchRun(uid="run", specimen="26 triX", written="26 triX", file=raw.uid, facts=FACTS, source="=run.mat"),
             prediction("d", "trix", PREDICTED),
             DesignRow(uid="d", design="trix", data="{}"),
             Withdrawal(uid="w", of="reading", supersedes="unbedded", reason="=by mistake"),
@@ -250,9 +224,3 @@ def test_without_pyarrow_parquet_is_refused_and_csv_is_not(full, tmp_path, monke
     with pytest.raises(MissingValue, match=r"pip install 'sensorgen\[parquet\]', or export CSV"):
         exchange.export(full, tmp_path / "r.parquet")
     assert exchange.export(full, tmp_path / "r.csv") == len(REMARKS) + 3
-
-
-def test_every_kind_has_every_column():
-    for kind in ROWS:
-        assert exchange.kind_of(exchange.COLUMNS[kind]) is kind
-        assert {"number"} == {f.name for f in dataclasses.fields(kind)} - set(exchange.COLUMNS[kind])

@@ -6,11 +6,10 @@ import math
 from dataclasses import replace
 
 import pytest
-from bench_files import written
 
 from sensorgen.analysis.comparison import of_iteration
 from sensorgen.analysis.comparison.expected import predicted
-from sensorgen.analysis.report import FORMATS, alternating, report
+from sensorgen.analysis.report import alternating, report
 from sensorgen.design.design import load
 from sensorgen.measure.log import Log, notes, prints
 from sensorgen.measure.log.prints import predicted_rows
@@ -168,14 +167,6 @@ def test_bake_shrinkage_and_defects_stand_beside_their_change(tmp_path, design):
     assert changes == pytest.approx((0.75, 1, 0.62, 0.64))
     said = "baked, hole) against reading 1: electrode resistance x 0.75, film resistance x 1, C at 100kHz x 0.62"
     assert said in " ".join(made.findings)
-
-
-def test_one_reading_gets_a_short_page_in_every_format(logged):
-    made, _ = logged(S1=("", {"Cp": ["60pF@1kHz"]}))
-    assert len(written(made, "md").splitlines()) <= 60
-    assert made.title == "S1: predicted and measured"
-    assert len(made.headline) <= 5
-    assert all(written(made, how) for how in FORMATS)
 
 
 def test_words_for_a_verdict_that_changes_over_frequency():

@@ -128,13 +128,6 @@ def test_what_impedance_could_tell_is_the_cards_map():
     assert list(weak.x) == [0.0, 50.0]
 
 
-def test_presses_of_a_run(recorded):
-    with Log(recorded) as log:
-        found = next(measured.runs(log, 30, []))
-    assert len(found.pairs.time_s) == 7
-    assert not any("no log of the rig" in note for note in found.notes)
-
-
 def run(*words):
     return cli.main(["report", *words], standalone_mode=False)
 
