@@ -11,18 +11,7 @@ from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.measure.csv_table import CsvTable
-from sensorgen.measure.log import (
-    Batch,
-    BenchRun,
-    Log,
-    Print,
-    RawFile,
-    Reading,
-    entries,
-    exchange,
-    files,
-    verify,
-)
+from sensorgen.measure.log import Batch, BenchRun, Log, Print, RawFile, Reading, entries, exchange, files, verify
 from sensorgen.measure.log.entries import ROWS, DesignRow, Withdrawal
 from sensorgen.measure.log.notes import reading
 from sensorgen.measure.log.prints import prediction
@@ -130,9 +119,8 @@ def test_any_text_comes_back_from_csv(words):
 
 def test_a_terminal_obeys_no_cell_and_the_text_comes_back():
     bad = "a\x1b[31m\x9b2J\u202eb\x07"
-    rows = [
-        Reading(uid="u", specimen="S", written="S", remark=word, doubts=(word,)) for word in (bad, f"'\"{bad}", "'\"a")
-    ]
+    words = (bad, f"'\"{bad}", "'\"a")
+    rows = [Reading(uid="u", specimen="S", written="S", remark=word, doubts=(word,)) for word in words]
     text = "".join(exchange.csv_lines(Reading, rows))
     assert not set("\x1b\x9b\u202e\x07") & set(text)
     assert list(exchange.from_csv(Reading, CsvTable("x", io.StringIO(text, newline="")))) == rows
@@ -151,20 +139,11 @@ def test_any_numbers_come_back(ohm, baked, number):
 @pytest.mark.parametrize(
     ("column", "cell"),
     [
-        ("y_ohm", "[1, nan]"),
-        ("y_ohm", "[1"),
-        ("y_ohm", "1"),
-        ("y_ohm", '["1"]'),
-        ("y_ohm", "[true]"),
-        ("baked", "True"),
-        ("film_mm", "nan"),
-        ("film_mm", "inf"),
-        ("iteration", "1.5"),
-        ("doubts", "[1]"),
-        ("doubts", "[" * 9000),
-        ("source_row", "x"),
+        ("y_ohm", "[1, nan]"), ("y_ohm", "[1"), ("y_ohm", "1"), ("y_ohm", '["1"]'), ("y_ohm", "[true]"),
+        ("baked", "True"), ("film_mm", "nan"), ("film_mm", "inf"), ("iteration", "1.5"), ("doubts", "[1]"),
+        ("doubts", "[" * 9000), ("source_row", "x"),
     ],
-)
+)  # fmt: skip
 def test_a_cell_that_the_log_did_not_write_is_refused(full, tmp_path, column, cell):
     exchange.export(full, tmp_path / "r.csv")
     with (tmp_path / "r.csv").open(encoding="utf-8", newline="") as text:

@@ -176,14 +176,10 @@ def test_what_slicers_print_is_kept_beside_what_was_drawn(run, path, tmp_path):
     with Log(path) as log:
         (kept,) = log.predictions()
     assert json.loads(kept.data) == {"capacitance_f": {"lower": 1e-11}, "printed": {"prusa": report}}
-    for slicers, message in (
-        (3, "slicers is 3; expected a mapping"),
-        ({"prusa": []}, "slicers.prusa is []; expected a mapping"),
-        ({"prusa": {"printed": "x"}}, "slicers.prusa.printed is 'x'; expected a mapping"),
-    ):
+    wrong = {" is 3": 3, ".prusa is []": {"prusa": []}, ".prusa.printed is 'x'": {"prusa": {"printed": "x"}}}
+    for message, slicers in wrong.items():
         (tmp_path / "batch.json").write_text(json.dumps(BATCH | {"slicers": slicers}))
-        said = run("import", "batch.json", "--log", "new.db")
-        assert message in said.line
+        assert f"slicers{message}; expected a mapping" in run("import", "batch.json", "--log", "new.db").line
 
 
 OF_BATCH = {"design": "trix-d0.1", "design_id": "a" * 16, "expected": {"capacitance_f": {"lower": 1e-11}}}

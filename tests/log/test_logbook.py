@@ -314,10 +314,8 @@ def test_a_writer_who_does_not_end_is_told(log, path, monkeypatch):
     monkeypatch.setattr(database, "WAIT_S", 0.05)
     other = sqlite3.connect(path, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
-    with (
-        Log(path) as late,
-        pytest.raises(Unwritable, match=r"another program has locked the log .* nothing was logged"),
-    ):
+    refused = pytest.raises(Unwritable, match=r"another program has locked the log .* nothing was logged")
+    with Log(path) as late, refused:
         late.add([reading("23 triX", "650")])
     assert log.readings() == ()  # readers do not wait
     other.close()
