@@ -7,7 +7,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
 from sensorgen.workflows.batch import arranged
 from sensorgen.workflows.batch.plan import BatchPlan, Item, load, pieces, shuffled, tools
 
@@ -179,3 +179,14 @@ def test_any_mapping_is_a_plan_or_refused_in_words(tmp_path, data, whole):
     except SensorgenError:
         return
     assert len({piece.name for piece in found.pieces}) == len(found.pieces)
+
+
+def test_a_huge_specimen_fits_nowhere(plan):
+    with pytest.raises(OutOfRange, match=r"plan\.yaml: a specimen of .* fits on no plate"):
+        arranged(plan(HEAD + "  - {shape: tri, parameters: {length_mm: 400}}\n"))
+
+
+def test_the_nearest_design_is_offered(plan, tmp_path):
+    (tmp_path / "trix-d0.1.yaml").write_text("shape: tri\n")
+    with pytest.raises(UnknownName, match=r"did you mean 'trix-d0.1.yaml'"):
+        read(plan(HEAD + "  - {design: trix-d01.yaml}\n"))

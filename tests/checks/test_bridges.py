@@ -27,12 +27,7 @@ def walls(*spans: tuple[float, float], axis: str = "x", roof: tuple[float, float
 @pytest.mark.parametrize("axis", "xy")
 @pytest.mark.parametrize(
     ("gap", "severity", "limit"),
-    [
-        (0.44, None, None),
-        (0.44 + HAIR, "warning", 0.44),
-        (5.0, "warning", 0.44),
-        (5.0 + HAIR, "error", 5.0),
-    ],
+    [(0.44, None, None), (0.44 + HAIR, "warning", 0.44), (5.0, "warning", 0.44), (5.0 + HAIR, "error", 5.0)],
 )
 def test_a_bridge_is_judged_by_its_length(sensor, findings, axis, gap, severity, limit):
     found = findings(sensor(*walls((2, 4), (4 + gap, 12), axis=axis)), "9-")

@@ -35,8 +35,7 @@ def test_a_shape_without_a_film_is_a_short(findings, shape, turned):
 
 # Half a layer is 0.05 mm. On the grid, a film of exactly that ends on the sample, which the electrode above it takes.
 @pytest.mark.parametrize(
-    ("film_mm", "severities"),
-    [(0.05 - HAIR, ["error"]), (0.05, ["error"]), (0.05 + HAIR, ["warning", "warning"])],
+    ("film_mm", "severities"), [(0.05 - HAIR, ["error"]), (0.05, ["error"]), (0.05 + HAIR, ["warning", "warning"])]
 )
 def test_a_film_under_half_a_layer_is_an_error(sensor, findings, film_mm, severities):
     found = findings(sensor(film_mm=film_mm), "2-film")

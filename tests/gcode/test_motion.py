@@ -134,8 +134,7 @@ def test_arcs_beside_the_plane_of_the_bed_are_straight_and_said():
 
 
 @pytest.mark.parametrize(
-    "line",
-    ["G2 X5 Y5", "G2 X5 R1", "G2 X9 Y9 I1 J0", "G2 X5 Rnan", "G3 X9 I9" + 17 * "0", "G3 X9 I" + 400 * "9"],
+    "line", ["G2 X5 Y5", "G2 X5 R1", "G2 X9 Y9 I1 J0", "G2 X5 Rnan", "G3 X9 I9" + 17 * "0", "G3 X9 I" + 400 * "9"]
 )
 def test_an_arc_that_cannot_be_is_a_straight_line_and_said(line):
     motion = follow([R, "G1 X10", line])

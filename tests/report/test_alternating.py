@@ -80,10 +80,7 @@ def test_verdicts_go_by_frequency_and_flags_name_what_is_impossible(logged):
     found = {(row.specimen, row.frequency_hz): row for row in rows(made)}
     assert [found["leaky", f].verdict for f in (1e3, 1e4)] == ["leaking", "capacitor"]
     assert found["wrong", 3e6].flag == "negative resistance; outside the range of HP 4284A"
-    ohm, farad = (
-        2 * 0.042 * 0.1 / (0.3e-3 * 0.01),
-        8.8541878128e-12 * 4.68 * 0.1 * 0.01 / 0.4e-3,
-    )  # both electrodes, film
+    ohm, farad = 2 * 0.042 * 0.1 / (0.3e-3 * 0.01), 8.8541878128e-12 * 4.68 * 0.1 * 0.01 / 0.4e-3  # electrodes, film
     line = cmath.sqrt(2j * math.pi * 3e6 * ohm * farad)
     by_tanh = (line * cmath.tanh(line) / ohm).imag / (2 * math.pi * 3e6)
     assert found["wrong", 3e6].c_predicted_pf == pytest.approx(1e12 * by_tanh, rel=1e-3)

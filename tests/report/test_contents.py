@@ -1,6 +1,7 @@
 """A report of Table D.1 against the table itself, in every format; with bad words, with recordings, with nothing."""
 
 import csv
+import dataclasses
 import io
 import itertools
 import json
@@ -19,6 +20,7 @@ from scipy import stats
 
 from no_numbers import roughly_at_rest
 from sensorgen.analysis.comparison import measured, of_iteration
+from sensorgen.analysis.plots.static import files
 from sensorgen.analysis.report import FORMATS, electrodes, report, yields
 from sensorgen.core import document
 from sensorgen.core.document import shown as shown_as
@@ -294,6 +296,16 @@ def test_tones_beside_their_prediction(of_recorded):
     assert c == pytest.approx([1.3 * column(found, "C predicted")[0]] * len(c), rel=3e-3)
     x, expected, residual = (np.array(column(found, n)) for n in ("X measured", "X predicted", "residual of X"))
     assert residual == pytest.approx((x - expected) / abs(expected), rel=2e-2)
+
+
+def test_figures_as_files(of_recorded):
+    for key in ("residuals", "reactance-1-1"):
+        chart = next(chart for chart in of_recorded.figures if chart.key == key)
+        chart = dataclasses.replace(chart, choices=dict(list(chart.choices.items())[:1]))
+        found = dict(files(chart))
+        assert sorted(content[:4] for content in found.values()) == [b"<?xm", b"\x89PNG"]
+        assert dict(itertools.islice(files(chart), 2)) == found  # the same bytes again
+        assert all(re.fullmatch(r"[A-Za-z0-9.-]+", name) for name in found)
 
 
 class Page(HTMLParser):
