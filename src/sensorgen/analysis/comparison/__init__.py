@@ -10,6 +10,7 @@ from math import inf, isfinite, isnan, log, nan
 from sensorgen.analysis.comparison.expected import Predicted, stored_or_made
 from sensorgen.analysis.comparison.measured import Measured, readings
 from sensorgen.core.bounds import Bounds
+from sensorgen.core.display import Displayed
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.lazy import Lazy
 from sensorgen.core.units import M_PER_MM
@@ -89,7 +90,7 @@ class Compared:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Displayed):
     """An iteration.
 
     Attributes

@@ -17,6 +17,7 @@ from sensorgen.analysis.calibration import SpecimenEntries
 from sensorgen.analysis.comparison import AllowedValues
 from sensorgen.analysis.comparison.expected import PERMITTIVITY, Movable
 from sensorgen.core.arrays import Real
+from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.lazy import by_key
 from sensorgen.core.version import __version__
@@ -92,7 +93,7 @@ class GroupError:
 
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(Displayed):
     """A fit.
 
     Attributes
