@@ -175,6 +175,20 @@ def test_a_design_is_pressed_by_its_own_tip():
     assert "tip 30 mm" in sg.predict(wide, force_n=6.0, position_mm=50.0).text()
 
 
+def test_reports_of_nothing_are_refused(tmp_path):
+    with sg.Log(tmp_path / "log.db", create=True) as log:
+        log.add([reading("30 SX60 2", "1.2k", "OL")])
+        for asked in (
+            lambda: sg.report(log, 30, path=tmp_path / "r.pdf"),
+            lambda: sg.compare(log, 99),
+            lambda: sg.fit(log, "30 SX60 2", iteration=30),
+        ):
+            with pytest.raises(SensorgenError, match=r"unknown format|expected"):
+                asked()
+        named = sg.report(log, None, "30 SX60 2", "30 sx60 2", path=tmp_path / "r.csv")
+    assert (named.specimens, [path.name for path in tmp_path.glob("r.*")]) == (("30 SX60 2",), ["r.csv"])
+
+
 def test_files_are_written(tmp_path):
     (body,) = sg.export_design(PLATE, tmp_path / "plate.3mf")
     assert body.read_bytes()[:2] == b"PK"

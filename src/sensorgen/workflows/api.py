@@ -15,12 +15,12 @@ from sensorgen.analysis.fit import fit as fit_values
 from sensorgen.analysis.fit.estimates import Fit
 from sensorgen.checks.review import Review
 from sensorgen.core import files
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design import design as designs
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.settings import varied
-from sensorgen.measure.log import Log
+from sensorgen.measure.log import Log, Reading
 from sensorgen.prediction import bodies, compression, evaluate
 from sensorgen.prediction import capacitance_answer as at_rest
 from sensorgen.prediction.calibration import inversion
@@ -361,9 +361,12 @@ def report(log: Log, iteration: int | None = None, *specimens: str, path: str | 
     from sensorgen.analysis import report as reports
 
     file = Path(path)
+    how = file.suffix.lstrip(".") or "html"
+    if how not in reports.FORMATS:
+        raise UnknownName("format of a report", how, reports.FORMATS)
     compared = reports.report(log, iteration, specimens=specimens)
     with files.replacing(file) as target:
-        target.writelines(piece.encode() for piece in reports.pieces(compared, file.suffix.lstrip(".") or "html"))
+        target.writelines(piece.encode() for piece in reports.pieces(compared, how))
     return compared
 
 
@@ -440,11 +443,15 @@ def calibrate(log: Log, *specimens: str, bench: Bench | None = None) -> list[Cal
 
 def compare(log: Log, iteration: int) -> Comparison:
     """Readings of an iteration beside the predictions of their designs; as :func:`of_iteration`."""
+    if not any(True for _ in log.about(Reading, iteration)):
+        raise BadInput(f"no readings of iteration {iteration} in the log; expected another, as Log.readings() shows")
     return of_iteration(log, iteration)
 
 
 def fit(log: Log, *specimens: str, iteration: int | None = None) -> Fit:
     """Material values by what was measured of specimens or of an iteration; as :func:`sensorgen.analysis.fit.fit`."""
+    if specimens and iteration is not None:
+        raise BadInput(f"iteration={iteration} beside specimens; expected one of the two")
     return fit_values(log, iteration, specimens=specimens)
 
 

@@ -185,7 +185,7 @@ def report(
         The log has no readings of the iteration, or of a specimen.
     """
     step("readings")
-    specimens = tuple(named(name, log).specimen for name in specimens)
+    specimens = tuple(dict.fromkeys(named(name, log).specimen for name in specimens))
     comparison = of_iteration(log, iteration, step, specimens=specimens)
     left_out = list(comparison.left_out)
     step("recordings")
