@@ -450,8 +450,6 @@ def compare(log: Log, iteration: int) -> Comparison:
 
 def fit(log: Log, *specimens: str, iteration: int | None = None) -> Fit:
     """Material values by what was measured of specimens or of an iteration; as :func:`sensorgen.analysis.fit.fit`."""
-    if specimens and iteration is not None:
-        raise BadInput(f"iteration={iteration} beside specimens; expected one of the two")
     return fit_values(log, iteration, specimens=specimens)
 
 

@@ -21,7 +21,7 @@ from sensorgen.core.lazy import by_key
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.measure.log import BenchRun, Log, Reading
-from sensorgen.measure.log.notes import specimen as named
+from sensorgen.measure.log.notes import asked
 from sensorgen.prediction import bodies
 from sensorgen.prediction.rest_state import electrode_resistance
 
@@ -66,7 +66,7 @@ def fit(
         Nothing of them in the log that a fit could use; no such specimen.
     """
     step("readings")
-    specimens = tuple(dict.fromkeys(named(name, log).specimen for name in specimens))
+    specimens = asked(log, iteration, specimens)
     comparison = of_iteration(log, iteration, step, body_of, specimens=specimens)
     left_out = list(comparison.left_out)
     step("recordings")

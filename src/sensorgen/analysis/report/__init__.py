@@ -31,7 +31,7 @@ from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
 from sensorgen.design.materials import SET, citations
 from sensorgen.measure.log import Anchor, Log, RawFile
-from sensorgen.measure.log.notes import specimen as named
+from sensorgen.measure.log.notes import asked
 from sensorgen.prediction.identifiability.results import Identifiability, StandardErrors
 from sensorgen.prediction.query import FORCE_N
 from sensorgen.prediction.slices import reviewed
@@ -185,7 +185,7 @@ def report(
         The log has no readings of the iteration, or of a specimen.
     """
     step("readings")
-    specimens = tuple(dict.fromkeys(named(name, log).specimen for name in specimens))
+    specimens = asked(log, iteration, specimens)
     comparison = of_iteration(log, iteration, step, specimens=specimens)
     left_out = list(comparison.left_out)
     step("recordings")

@@ -169,6 +169,13 @@ def specimen(written: str, log: Log | None = None) -> Specimen:
         raise BadInput(f"{error}; or bind it to its design: sensorgen log specimen NAME --design FILE") from None
 
 
+def asked(log: Log, iteration: int | None, written: Sequence[str]) -> tuple[str, ...]:
+    """Specimens of a question, each once; BadInput where it names an iteration beside them."""
+    if written and iteration is not None:
+        raise BadInput(f"iteration {iteration} beside specimens; expected one of the two")
+    return tuple(dict.fromkeys(specimen(name, log).specimen for name in written))
+
+
 def _bound(written: str, log: Log | None) -> Print | None:
     return log.bound(" ".join(written.split())) if log else None
 
