@@ -184,7 +184,7 @@ def publish(stage: Path, folder: Path, manifest: str = MANIFEST) -> None:
     A user's own files in the folder stay. Another run that publishes here, and Ctrl-C, wait until all are in place.
     """
     folder.mkdir(exist_ok=True)
-    staged = {_key(file, stage): file for file in _files(stage)}
+    staged = _files(stage)
     targets = {name: folder / name for name in staged}
     for target in targets.values():
         if not target.parent.resolve().is_relative_to(folder.resolve()):
@@ -253,7 +253,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 def hashes(folder: Path) -> dict[str, str]:
     """SHA-256 of every file below a folder, by its name relative to it."""
-    return {_key(f, folder): sha256(f.read_bytes()).hexdigest() for f in sorted(_files(folder))}
+    return {name: sha256(file.read_bytes()).hexdigest() for name, file in _files(folder).items()}
 
 
 def seal(content: Mapping[str, Any]) -> str:
@@ -262,12 +262,9 @@ def seal(content: Mapping[str, Any]) -> str:
     return sha256(json.dumps(rest, sort_keys=True, ensure_ascii=False).encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def _files(folder: Path) -> list[Path]:
-    return [f for f in folder.rglob("*") if f.is_file()]
-
-
-def _key(file: Path, folder: Path) -> str:
-    return file.relative_to(folder).as_posix()
+def _files(folder: Path) -> dict[str, Path]:
+    """Files below a folder by their names relative to it."""
+    return {file.relative_to(folder).as_posix(): file for file in sorted(folder.rglob("*")) if file.is_file()}
 
 
 def listed(folder: Path, manifest: str = MANIFEST) -> list[str]:
