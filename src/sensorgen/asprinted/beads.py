@@ -19,6 +19,7 @@ from sensorgen.design.design import Design
 from sensorgen.export.gcode.motion import Paths, follow, paths_of
 from sensorgen.export.gcode.moves import Motion
 from sensorgen.export.gcode.reading import Source
+from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, parts
 from sensorgen.scene.scene import SLIVER_MM, Point
 
@@ -440,20 +441,19 @@ def _of_tools(design: Design, motion: Motion) -> Paths:
 
 def connected(start_mm: Real, end_mm: Real) -> Whole:
     """Number of the connected group of each line in plan: lines of a group have no gap of ``APART_MM`` between them."""
-    from scipy import ndimage
-
     start_mm, end_mm = (np.clip(place, -_FAR_MM, _FAR_MM) for place in (start_mm, end_mm))
     way = end_mm - start_mm
     count = np.maximum(np.ceil(np.abs(way).max(1) / _CELL_MM), 1).astype(np.int64) + 1
     which = np.repeat(np.arange(len(count)), count)
     share = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)) / (count[which] - 1)
     cell = np.floor((start_mm[which] + share[:, None] * way[which]) / _CELL_MM).astype(np.int64)
-    cell -= cell.min(0, initial=0)
-    filled = np.zeros(cell.max(0, initial=0) + 1, bool)
-    filled[cell[:, 0], cell[:, 1]] = True
-    label, _ = ndimage.label(filled, np.ones((3, 3)))
-    first = cell[np.cumsum(count) - count]
-    return np.asarray(label[first[:, 0], first[:, 1]])
+    x, y = (cell - cell.min(0, initial=0)).T
+    column = y.max(initial=0) + 2
+    filled, at = np.unique(x * column + y, return_inverse=True)
+    beside = filled + np.array([[1], [column - 1], [column], [column + 1]])
+    near = np.searchsorted(filled, beside).clip(max=len(filled) - 1)
+    touch = filled[near] == beside
+    return np.asarray(groups(len(filled), touch.nonzero()[1], near[touch])[at[np.cumsum(count) - count]])
 
 
 def _turned(paths: Paths) -> Paths:
