@@ -183,9 +183,9 @@ def layers(
     Notes
     -----
     A layer that is drawn as strips is cut across near the middle of the sensor, and the median cut is taken along the
-    whole strip. Of any other layer the union of all lines is taken, with slits between touching lines closed; the
-    outline of each separate part is moved until its area is what its lines deposit: round ends of short lines would
-    double a small tip. There "vol" and "deposit" are one.
+    whole strip. Of any other layer the union of all lines is taken; the outline of each separate part is moved until
+    its area is what its lines deposit: round ends of short lines would double a small tip. There "vol" and "deposit"
+    are one. Slits are closed that are no wider than a line of the file's width is over one of its volume.
     """
     if convention not in CONVENTIONS:
         raise UnknownName("convention for a line's width", convention, CONVENTIONS)
@@ -217,21 +217,21 @@ def _rest(region: Region, others: tuple[Region, ...]) -> Region:
 
 def _strips(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convention: str) -> Region:
     """The median of some cuts near the middle, along the whole sensor."""
-    axis = "yx".index(layer.along)
+    axis, slit = "yx".index(layer.along), ROUND * layer.height_mm
     long, end = size_mm[1 - axis], size_mm[axis]
-    cuts = [_cut(lines, axis, long / 2 + share * long / 10, convention).clip(0.0, end) for share in _CUTS]
+    cuts = [_cut(lines, axis, long / 2 + share * long / 10, convention, slit).clip(0.0, end) for share in _CUTS]
     low, high = sorted(cuts, key=lambda cut: float(np.diff(cut).sum()))[len(cuts) // 2].T
     return shapely.multipolygons(shapely.box(low, 0.0, high, long) if axis == 0 else shapely.box(0.0, low, long, high))
 
 
-def _cut(lines: Beads, axis: int, at_mm: float, convention: str) -> Real:
-    """Runs along an axis, (n, 2), in which a line square to it meets the beads [mm]."""
-    runs = _merged(_runs(lines.corners_mm(convention), axis, at_mm))
+def _cut(lines: Beads, axis: int, at_mm: float, convention: str, slit_mm: float) -> Real:
+    """Runs along an axis, (n, 2), in which a line square to it meets the beads, without slits up to a width [mm]."""
+    runs = _merged(_runs(lines.corners_mm(convention), axis, at_mm), slit_mm)
     if convention == "deposit" and len(runs):
         met = _runs(lines.corners_mm(convention, 0.0), axis, at_mm)  # ends that reach over the next line count once
         owner = (np.searchsorted(runs[:, 0], met.mean(1)) - 1).clip(0)
         taken = np.bincount(owner, np.diff(met)[:, 0], len(runs))
-        runs = _merged(runs + (taken - np.diff(runs)[:, 0]).clip(0.0)[:, None] / 2 * [-1, 1])
+        runs = _merged(runs + (taken - np.diff(runs)[:, 0]).clip(0.0)[:, None] / 2 * [-1, 1], slit_mm)
     return runs
 
 
@@ -246,13 +246,13 @@ def _runs(corners_mm: Real, axis: int, at_mm: float) -> Real:
     return np.asarray(runs[hit])
 
 
-def _merged(runs: Real) -> Real:
-    """Union of runs, (n, 2) [mm]."""
+def _merged(runs: Real, slit_mm: float) -> Real:
+    """Union of runs, (n, 2), and of the slits between them up to a width [mm]."""
     runs = runs[runs[:, 0].argsort()]
     if not len(runs):
         return runs
     reach = np.maximum.accumulate(runs[:, 1])
-    starts = np.flatnonzero(np.append(True, runs[1:, 0] > reach[:-1] + SLIVER_MM))
+    starts = np.flatnonzero(np.append(True, runs[1:, 0] > reach[:-1] + slit_mm))
     return np.column_stack([runs[starts, 0], reach[np.append(starts[1:], len(runs)) - 1]])
 
 
