@@ -4,6 +4,7 @@ import json
 import math
 import re
 import statistics
+from dataclasses import replace
 
 import bench_files
 import numpy as np
@@ -84,6 +85,27 @@ def test_the_interval_of_a_resistivity_is_as_wide_as_the_bounds_and_the_scatter(
     reach = stats.t.ppf(0.975, 6) * statistics.stdev(map(math.log, ends)) * math.sqrt(8 / 7)  # of one more print
     assert (wide.low, wide.high) == pytest.approx((wide.value / math.exp(reach), wide.value * math.exp(reach)))
     assert isinstance(resistivity(same[:2], "etpu"), Untold)
+
+
+def test_specimens_of_one_plate_do_not_tell_how_prints_differ():
+    """Seven specimens of a plate that agree: the next print may differ as those of the thesis, by a factor of 1.45."""
+    plate = [AllowedValues(at, at, print="P1") for at in np.log([0.0400, 0.0404, 0.0396, 0.0400, 0.0402, 0.0398, 0.04])]
+    found = resistivity(plate, "etpu")
+    assert found.high / found.value == pytest.approx(1.45 ** (stats.t.ppf(0.975, 35) * math.sqrt(2)), rel=1e-3)
+    alone = resistivity([replace(one, print="") for one in plate], "etpu")  # each a print of its own
+    assert alone.high / alone.value < 1.03
+
+
+def test_one_film_that_is_tight_makes_leaks_no_property():
+    films = [AllowedValues(0.0, 0.0, leak=at) for at in (-7.0, -7.01, -7.02, -math.inf)]
+    assert isinstance(leak(films[:3], "x60", 1), Fitted)
+    assert "1 of 4 films are tight" in leak(films, "x60", 1).why
+
+
+def test_a_specimen_counts_once_however_often_it_was_read(tmp_path):
+    with Log(tmp_path / "log.db", create=True) as log, roughly_at_rest():
+        log.add([notes.reading("60 triX .1mm 1", f"{ohm}", "OL") for ohm in (2000, 2001, 2002, 2001)])
+        assert "1 specimen with sound electrodes" in next(u.why for u in fit(log, 60).untold if "along" in u.parameter)
 
 
 def test_leaks_that_differ_by_decades_are_no_property():

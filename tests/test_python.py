@@ -10,16 +10,30 @@ import sensorgen as sg
 from no_numbers import roughly_at_rest
 from sensorgen.core.display import LINES
 from sensorgen.core.errors import BadInput, MissingValue, SensorgenError
+from sensorgen.measure.log.notes import reading
+from sensorgen.prediction.query import TONES_HZ
 
 PLATE = sg.Design(shape="reference")
 TRI = sg.Design(shape="tri", parameters={"length_mm": 6.0, "width_mm": 6.0})
 
 
 @pytest.fixture(scope="module")
-def results():
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("results")
     with roughly_at_rest():
         checked = sg.check(TRI)
-    return {
+    with sg.Log(folder / "log.db", create=True) as log:
+        log.add([reading(f"30 SX60 {k}", f"1.{k}k", "OL") for k in range(2, 6)])
+        measured = {
+            "compare": sg.compare(log, 30),
+            "fit": sg.fit(log, iteration=30),
+            "report": sg.report(log, 30, path=folder / "report.html"),
+        }
+    z = sg.predict(PLATE, force_n=[0.0, 3.0, 6.0], position_mm=30).impedance.impedance_ohm[..., 0].T
+    return measured | {
+        "build": sg.build(PLATE, folder, cad=False),
+        "invert": sg.invert(PLATE, TONES_HZ, z[1:], rest_ohm=z[:1]),
+        "perfect": sg.invert(PLATE, TONES_HZ, z[1:], perfect=True),
         "check": checked,
         "predict": sg.predict(PLATE),
         "loaded": sg.predict(PLATE, force_n=[1.0, 2.0, 3.0], position_mm=[30.0, 50.0]),
@@ -30,7 +44,13 @@ def results():
     }
 
 
-@pytest.mark.parametrize("name", ["check", "predict", "loaded", "compress", "cell", "sweep", "list"])
+ALL = (
+    "check", "predict", "loaded", "compress", "cell", "sweep", "list", "compare", "fit", "report", "build", "invert",
+    "perfect",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ALL)
 def test_a_result_is_shown_in_a_few_lines(results, name):
     lines = repr(results[name]).splitlines()
     assert 1 < len(lines) <= LINES
@@ -38,7 +58,7 @@ def test_a_result_is_shown_in_a_few_lines(results, name):
     assert "<table " in results[name]._repr_html_()
 
 
-@pytest.mark.parametrize("name", ["check", "predict", "loaded", "compress", "sweep", "list"])
+@pytest.mark.parametrize("name", ALL)
 def test_a_result_has_a_figure(results, name):
     axes = results[name].plot().axes
     drawn = [line for one in axes for line in one.lines if np.size(line.get_xdata())]
@@ -138,6 +158,7 @@ def test_lists_of_designs():
         lambda: sg.predict(PLATE, force_n=[2.0, 1.0]), lambda: sg.predict(PLATE, noise=-1.0),
         lambda: sg.predict(PLATE, frequency_hz=0.0), lambda: sg.cell(PLATE, frequency_hz=-1.0),
         lambda: sg.invert(sg.Design(shape="array"), [1e4], [[1.0]], noise=1e-3),
+        lambda: sg.invert(PLATE, [1e4], [[1.0]]),
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused(asked):
@@ -145,9 +166,33 @@ def test_what_makes_no_sense_is_refused(asked):
         asked()
 
 
+def test_a_softer_specimen_is_within_the_intervals_of_its_design():
+    tones = [1.1e3, 1e5]
+    z = sg.predict(PLATE, frequency_hz=tones, force_n=[0.0, 12.0], position_mm=50).impedance.impedance_ohm[..., 0]
+    pressed, rest = z[:, 1:].T, z[:, :1].T  # of a specimen that gives a third more: by 9 N
+    (low, high), *_ = sg.invert(PLATE, tones, pressed, rest_ohm=rest, noise=1e-5).force_90_n
+    assert low < 9.0 < high
+    (low, high), *_ = sg.invert(PLATE, tones, pressed, noise=1e-5, perfect=True).force_90_n
+    assert 9.0 < low < 12.0 < high
+
+
 def test_a_design_is_pressed_by_its_own_tip():
     wide = sg.Design(shape="reference", tip={"shape": "flat", "width_mm": 30.0})
     assert "tip 30 mm" in sg.predict(wide, force_n=6.0, position_mm=50.0).text()
+
+
+def test_reports_of_nothing_are_refused(tmp_path):
+    with sg.Log(tmp_path / "log.db", create=True) as log:
+        log.add([reading("30 SX60 2", "1.2k", "OL")])
+        for asked in (
+            lambda: sg.report(log, 30, path=tmp_path / "r.pdf"),
+            lambda: sg.compare(log, 99),
+            lambda: sg.fit(log, "30 SX60 2", iteration=30),
+        ):
+            with pytest.raises(SensorgenError, match=r"unknown format|expected"):
+                asked()
+        named = sg.report(log, None, "30 SX60 2", "30 sx60 2", path=tmp_path / "r.csv")
+    assert (named.specimens, [path.name for path in tmp_path.glob("r.*")]) == (("30 SX60 2",), ["r.csv"])
 
 
 def test_files_are_written(tmp_path):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shutil
 from dataclasses import replace
 
@@ -136,7 +137,10 @@ def test_the_log_with_a_calibration_is_sound(after):
 def test_the_report_has_it(after):
     said = after("report", "S1", "--format", "md", "-o", "-")
     assert said.code == 0, said.err
-    assert "S1 is calibrated by 24 known presses" in said.words
+    assert "S1 is calibrated by 24 known presses; over the prediction: resistance" in said.words
+    (told,) = re.findall(r"capacitance ([\d.]+) \(([\d.]+) to ([\d.]+)\)", said.words)
+    value, low, high = map(float, told)
+    assert low < value < high
     assert "## Calibrated specimens" in said.out
 
 

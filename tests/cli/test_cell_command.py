@@ -101,55 +101,6 @@ def test_an_accuracy_below_what_is_possible(run):
     assert "F/m2" in said.out
 
 
-def test_a_formula_of_the_thesis_by_its_number(run):
-    """Off by -25 %: the spec's and docs/models.md's number for vertical columns."""
-    found = answer(run("cell", "tri", "--dielectric", 0.1, "--model", "thesis-3.35", "--json"))
-    assert found["value_f_per_m2"] / TRI[0.1] - 1 == pytest.approx(-0.252, abs=1e-3)
-    assert (found["lower_f_per_m2"], found["upper_f_per_m2"]) == (None, None)
-    assert "without bounds" in run("cell", "tri", "--model", "thesis-3.35").out
-    half = answer(run("cell", "tri", "--model", "thesis-film-only", "--set", "eps_x60=2.34", "--json"))
-    whole = answer(run("cell", "tri", "--model", "thesis-film-only", "--json"))
-    assert 2 * half["value_f_per_m2"] == pytest.approx(whole["value_f_per_m2"], rel=1e-12, abs=0)
-    assert "thesis-3.35 applies to tri, not to rect" in run("cell", "rect", "--model", "thesis-3.35").line
-
-
-@pytest.mark.parametrize("period", [2.0, 0.3])
-def test_the_thesis_geometry_at_rest_is_the_cell(run, period):
-    """Scaled as a whole, a cell keeps its capacitance per depth."""
-    sizes = {"period_mm": period, "hang_height_mm": period / 4, "lower_height_mm": 0.12 * period}
-    words = [w for k, v in (sizes | {"dielectric_mm": period / 20}).items() for w in ("--set", f"{k}={v!r}")]
-    found = answer(run("cell", "tri", *words, "--model", "thesis-3.1.2", "--press", 0, "--json"))
-    assert found["value_f_per_m2"] == pytest.approx(TRI[0.1] * 2.0 / period, rel=1e-3, abs=0)
-    assert "fem2d within" in found["reason"]
-
-
-def test_the_thesis_geometry_of_a_pressed_cell(run):
-    """At 100 kPa it has 22.2 % of the rise that other programs solved: docs/cells.md."""
-    found = answer(run("cell", "tri", "--dielectric", 0.1, "--model", "thesis-3.1.2", "--press", "33.118um", "--json"))
-    expected = TRI[0.1] + 0.222 * 52.508e-12 / 2e-3
-    assert found["value_f_per_m2"] == pytest.approx(expected, rel=2e-3, abs=0)
-
-
-def test_presses_of_a_formula(run):
-    """3.55's term, by hand: 8/16 eps0 eps w h1 / (h1 - dh)^2 on top of 3.49; several presses make a table."""
-    words = ("cell", "rect", "--dielectric", 0.1, "--model", "thesis-3.55", "--press")
-    rows = answer(run(*words, "0,20,50um", "--json"))
-    rest = answer(run(*words[:4], "--model", "thesis-3.49", "--json"))["value_f_per_m2"]
-    assert [row["press_mm"] for row in rows] == [0.0, 0.02, 0.05]
-    for row in rows:
-        h1, dh = 0.7e-3, row["press_mm"] * 1e-3
-        term = 0.5 * 8.8541878128e-12 * 4.68 * (0.7e-3 * 0.5e-3) * h1 / (h1 - dh) ** 2 / 4e-6
-        assert row["value_f_per_m2"] - rest == pytest.approx(term, rel=1e-6, abs=0)
-    table = list(csv.DictReader(io.StringIO(run(*words, "0,20,50um", "--csv").out)))
-    assert [float(row["value_f_per_m2"]) for row in table] == [row["value_f_per_m2"] for row in rows]
-    assert [line.split()[0] for line in run(*words, "0,0.05").out.splitlines()[:3]] == ["press_mm", "0", "0.05"]
-    assert "pressed by 0.05 mm" in run(*words, "0.05").out
-    swept = list(csv.DictReader(io.StringIO(run(*words, "0.05", "--sweep", "dielectric_mm=0.1,0.2", "--csv").out)))
-    assert float(swept[0]["value_f_per_m2"]) == rows[2]["value_f_per_m2"]
-    gone = run("cell", "tri", "--model", "thesis-3.35-swept", "--press", "0.1,0.5", "--csv")
-    assert (gone.code, "all air is gone at 0.379 mm" in gone.out) == (1, True)
-
-
 @pytest.fixture
 def no_solver(monkeypatch):
     """Nothing that NGSolve brings can be imported."""
@@ -207,18 +158,6 @@ def test_a_sweep_as_csv_and_json(run):
     lowers = [entry["lower_f_per_m2"] for entry in longer]
     assert lowers == sorted(lowers, reverse=True)
     assert lowers[::2] == [entry["lower_f_per_m2"] for entry in found]
-
-
-def test_a_sweep_of_a_formula(run):
-    """Value by value what the formula gives alone, as JSON, CSV and table."""
-    words = ("cell", "rect", "--sweep", "dielectric_mm=0.1,0.2", "--model", "thesis-3.49-own-widths")
-    rows = answer(run(*words, "--json"))
-    alone = [answer(run("cell", "rect", "--dielectric", d, *words[4:], "--json")) for d in (0.1, 0.2)]
-    assert [r["value_f_per_m2"] for r in rows] == [a["value_f_per_m2"] for a in alone]
-    table = list(csv.DictReader(io.StringIO(run(*words, "--csv").out)))
-    assert [float(r["value_f_per_m2"]) for r in table] == [r["value_f_per_m2"] for r in rows]
-    assert [line.split()[0] for line in run(*words).out.splitlines()[:3]] == ["dielectric_mm", "0.1", "0.2"]
-    assert "thesis-3.49-own-widths applies to rect, not to tri" in run("cell", "tri", *words[2:]).err
 
 
 def test_a_sweep_over_a_material_and_over_words(run):
@@ -335,18 +274,6 @@ def stat(pid):
         (["--jobs", "0"], "--jobs"),
         (["--drawn", "--walls", "cura"], "--drawn and --walls at once; expected one of them"),
         (["--as-printed"], "unknown option '--as-printed'"),
-        (["--model", "thesis-3.35", "--press", "0.01"], "knows no press; expected thesis-3.35-swept, thesis-3.1.2"),
-        (
-            ["--press", "0.01"],
-            "--press is for formulas, as --model thesis-3.1.2; solved, under a stress: sensorgen compr",
-        ),
-        (["--model", "columns", "--press", "0.01"], "--press is for formulas"),
-        (["--model", "thesis-3.1.3"], "unknown formula 'thesis-3.1.3'; did you mean 'thesis-3.1.2'"),
-        (["--model", "thesis-3.35", "--explain"], "there is no plan; leave out --model"),
-        (["--model", "thesis-3.1.2", "--press", "0.5"], "all air is gone at 0.379 mm; expected less"),
-        (["--model", "thesis-3.1.2", "--press", "-1"], "expected 0 or more"),
-        (["--model", "thesis-3.1.2", "--set", "loss_x60=0.1"], "knows no losses"),
-        (["--model", "thesis-3.1.2", "--press", "0,0.1", "--sweep", "dielectric_mm=0.1,0.2"], "expected one of them"),
     ],
 )
 def test_wrong_words(run, words, said):

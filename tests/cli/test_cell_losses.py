@@ -83,7 +83,6 @@ def test_a_loss_may_be_swept_from_0(run):
         (("--set", "loss_x60=-0.1"), "expected 0 to 1e+06"),
         (("--set", "loss_x60=1e7"), "expected 0 to 1e+06"),
         (("--set", "loss_x60=0.1", "--model", "columns"), "losses are solved by fem2d and fem3d alone"),
-        (("--set", "loss_x60=0.1", "--model", "thesis-3.35"), "knows no losses"),
         (("--set", "loss_x60=0.1", "--frequency", "1kHz,2kHz"), "expected one"),
         (("--set", "loss_x60=0.1", "--frequency", "0"), "above 0"),
     ],

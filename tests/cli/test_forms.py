@@ -9,7 +9,6 @@ import pytest
 pytestmark = pytest.mark.usefixtures("shared_cache")
 COMMANDS = {
     "cell": ("cell", "reference"),
-    "formula": ("cell", "rect", "--model", "thesis-3.49"),
     "cells": ("cell", "reference", "--sweep", "eps_x60=2,4", "--jobs", "1"),
     "compress": ("compress", "reference", "--model", "springs", "--stress", "10,20"),
     "predict": ("predict", "reference", "--force", "0:6:3", "--position", "50"),

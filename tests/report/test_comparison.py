@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bench_files import ladder
 
+from no_numbers import roughly_at_rest
 from sensorgen.analysis.comparison import of_iteration
 from sensorgen.analysis.comparison.expected import Movable, at_rest, moved, predicted, pressed, stored_or_made
 from sensorgen.analysis.report import origins
@@ -212,3 +213,34 @@ def test_stored_predictions_are_plain_data(tmp_path):
         kept = stored_or_made(default_body(design), book, [logged], [], [])
     assert json.loads(row.data)["capacitance"]["lower"] == kept.prediction.capacitance.lower
     assert kept.prediction == dataclasses.replace(found, plan=without_times(found.plan))  # stored without run times
+
+
+def compared(folder, *rows):
+    with Log(folder / "log.db", create=True) as book, roughly_at_rest():
+        book.add(rows)
+        return of_iteration(book, 60)
+
+
+@pytest.mark.parametrize("first", ["y", "z"])
+def test_two_readings_of_one_resistance_each_make_one_verdict(first, tmp_path):
+    """A meter with two leads logs R_Y and R_Z one after the other; the verdict is that of both in one reading."""
+    kinds = {"y": ("1.2k", ""), "z": ("", "OL")}
+    other = "z" if first == "y" else "y"
+    apart = compared(tmp_path, *(notes.reading("60 SX60 2", *kinds[axis]) for axis in (first, other)))
+    (tmp_path / "whole").mkdir()
+    whole = compared(tmp_path / "whole", notes.reading("60 SX60 2", "1.2k", "OL"))
+    assert [row.verdict.word for row in apart.rows] == ["intact", "intact"] == [whole.rows[0].verdict.word] * 2
+    assert [row.verdict.word for row in apart.last] == ["intact"]
+    assert sum(np.isfinite(row.residual) for row in apart.rows) == 1  # R_Y was read once
+    assert not [why for _, why in apart.left_out if "counts for nothing" in why]
+
+
+def test_a_bake_parts_readings(tmp_path):
+    before, after = notes.reading("60 SX60 2", "1.2k", baked=False), notes.reading("60 SX60 2", "", "OL", baked=True)
+    assert {row.verdict.word for row in compared(tmp_path, before, after).rows} == {"unknown"}
+
+
+def test_four_wires_read_an_electrode_without_leads(tmp_path):
+    four = dataclasses.replace(notes.reading("60 SX60 2", "3k", "OL"), wires=4)
+    row, other = compared(tmp_path, four, notes.reading("60 SX60 3", "3k", "OL")).rows
+    assert row.expected_ohm.upper == row.predicted.along_ohm(inf).alone().upper < other.expected_ohm.upper

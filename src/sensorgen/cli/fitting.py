@@ -247,7 +247,7 @@ Format = Annotated[str, Option(kind=("html", "md", "csv", "json"))]
 @of_function("report")
 def report_command(
     specimens: tuple[str, ...] = (), *, iteration: Iteration = None,
-    log: LogFile, output: str = "", how: Format = "html", pictures: Path | None = None, show_it: bool = False,
+    log: LogFile, output: str = "", how: Format = "", pictures: Path | None = None, show_it: bool = False,
 ) -> None:  # fmt: skip
     """Compare predictions and measurements of specimens, of an iteration, or of everything in the log.
 
@@ -260,7 +260,7 @@ def report_command(
     output, --output, -o : FILE
         File to write; report-WHICH.FORMAT here if not given, - to print.
     how, --format
-        Of the file.
+        Of the file; by its name's end, else html, if not given.
     iteration
         Of the design.
     pictures, --figures : FOLDER
@@ -268,8 +268,10 @@ def report_command(
     show_it, --open
         Show the page in the browser.
     """
-    from sensorgen.analysis.report import STEPS, pieces, report
+    from sensorgen.analysis.report import FORMATS, STEPS, pieces, report
 
+    end = Path(output).suffix.lstrip(".")
+    how = how or (end if end in FORMATS else "html")
     if show_it and (how != "html" or output == "-"):
         raise BadInput("--open shows an HTML file; expected --format html and a file")
     if specimens and iteration is not None:

@@ -190,19 +190,14 @@ def _of_design(
         return task.run((_REST,), lambda source: _Perfect(task, printed, query, source))
 
     def inverter(rest: Any, tones_hz: Any, noise: Any) -> _Made:
-        from sensorgen.prediction.calibration import fitting
-        from sensorgen.prediction.calibration.inversion import Inverter
-        from sensorgen.prediction.calibration.specimen import Bench, SpecimenModel, spread_of
+        from sensorgen.prediction.calibration import inversion
         from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
         from sensorgen.prediction.sensor_model import sensor_model
 
-        predicted, _ = sensor_model(printed, query)
-        model = SpecimenModel(predicted.sensor, tones_hz, spread_of(predicted, Bench()))
-        limit_n, (mean, count) = task.force_limit_n or FORCE_LIMIT_N, rest.mean()
-        if not np.isfinite(mean).all():
-            raise BadInput(f"{task.measured}: a frequency without a reading at rest; expected one at each")
-        known = fitting.by_rest(model, np.log(mean), noise / count**0.5, noise)
-        return _Made(Inverter(model, known, task.distribution, limit_n), limit_n, 0, predicted.doubts)
+        predicted, limit_n = sensor_model(printed, query)[0], task.force_limit_n or FORCE_LIMIT_N
+        with within(task.measured):
+            by = inversion.of_design(predicted, tones_hz, rest, noise, task.distribution, limit_n)
+        return _Made(by, limit_n, 0, predicted.doubts)
 
     return task.run((_REST, _TIME), lambda source: _ByRatio(task, _Sensor(design.name, inverter), source))
 

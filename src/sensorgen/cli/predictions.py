@@ -154,9 +154,7 @@ def _plot(result: "Loaded", folder: Path) -> None:
     render.say("\n".join(str(folder / file) for file in plots.STEPS))
 
 
-FORMULA = "thesis-"  # how the names of formulas begin
 Frequency = Annotated[float | None, Option(kind=FREQUENCY_HZ)]
-Press = Annotated[tuple[float, ...], Option(zero=True)]  # fmt: skip
 
 
 @of_design(
@@ -166,7 +164,7 @@ Press = Annotated[tuple[float, ...], Option(zero=True)]  # fmt: skip
 )  # fmt: skip
 def cell_command(
     design: "Design", *, accuracy: Annotated[float | None, Option(kind="ratio")] = None, model: str = "",
-    frequency_hz: Frequency = None, press_mm: Press = (), explain: Explain = False, no_cache: NoCache = False,
+    frequency_hz: Frequency = None, explain: Explain = False, no_cache: NoCache = False,
     body: BodyChoice, sweeping: Sweeping,
 ) -> int:  # fmt: skip
     """Bounds of one design, or of each of a sweep.
@@ -176,36 +174,18 @@ def cell_command(
     accuracy
         Relative width of the bounds; 1e-3 for a cross-section and 1e-2 in 3D if not given, as in all commands.
     model : NAME
-        Ask this model only: columns, thesis-3.35.
+        Ask this model only: columns.
     frequency_hz
         Of the field, where a dielectric leaks: --set resistivity_x60=1e8; a loss_x60=0.02 needs none.
-    press_mm
-        Displacement of the top, as 20um or 0:0.05:0.01, for formulas of it; solved: compress.
     """
     from sensorgen.prediction import capacitance_answer as cell
 
     options.refuse_explain(explain, many=bool(sweeping.sweep))
     asked = cell.CapacitanceQuestion(accuracy, model, not no_cache, frequency_hz)
-    if model.startswith(FORMULA):
-        if explain:
-            raise BadInput(f"--explain: {model} is asked alone, there is no plan; leave out --model")
-        return ended(_by_formula(design, asked, press_mm, sweeping))
-    if press_mm:
-        raise BadInput("--press is for formulas, as --model thesis-3.1.2; solved, under a stress: sensorgen compress")
     if sweeping.sweep:
         return ended(sweeping.over(design, body, cell.sweep, asked))
     bounds = cell.answer(body(design), asked)
     return ended(bounds, before=bounds.explained() if explain else ())
-
-
-def _by_formula(design: "Design", asked: Any, press_mm: tuple[float, ...], sweeping: Sweeping) -> Any:
-    """Answer of a formula of the thesis, for each design and each displacement."""
-    from sensorgen.prediction import thesis_formulas as formulas
-
-    if not sweeping.sweep and len(press_mm) < 2:
-        return formulas.answer(design, asked, *press_mm)
-    key, points = sweeping.designs(design) if sweeping.sweep else ("", [("", design)])
-    return formulas.sweep(key, points, asked, press_mm)
 
 
 MODELS = ("press2d", "press3d", "press_round", "springs", "unconfined", "bonded", "infill")

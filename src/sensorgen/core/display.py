@@ -2,9 +2,8 @@
 
 import re
 from functools import singledispatch
-from html import escape
 from io import StringIO
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -41,13 +40,17 @@ _STYLE = (  # as that of pages, which a notebook's own colours may overlay
 
 
 @singledispatch
+def parts(thing: Any) -> "Iterable[Part]":
+    """Paragraphs, facts and tables of a result; how it calls itself where it has none."""
+    return cast("Iterable[Part]", thing.document()) if hasattr(thing, "document") else (repr(thing),)
+
+
+@singledispatch
 def html(thing: object) -> str:
     """A result as HTML."""
-    if not hasattr(thing, "document"):
-        return f"<pre>{escape(repr(thing))}</pre>"
     from sensorgen.core import document
 
-    return document.html(thing.document())
+    return document.html(parts(thing))
 
 
 @singledispatch
@@ -64,11 +67,6 @@ class Boundless:
 
 class Displayed:
     """A result that shows itself: a table in a notebook, its first lines elsewhere, a figure by :meth:`plot`."""
-
-    if TYPE_CHECKING:
-
-        def document(self) -> "Iterable[Part]":
-            """Paragraphs, facts and tables."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -91,7 +89,7 @@ class Displayed:
         """The result as the command line prints it."""
         from sensorgen.core import document
 
-        return "\n".join(document.text(self.document()))
+        return "\n".join(document.text(parts(self)))
 
     def plot(self) -> Any:
         """The result as a matplotlib figure."""
@@ -105,5 +103,5 @@ class Displayed:
         pd = library("pandas", "to_pandas() needs pandas: pip install pandas")
         if hasattr(self, "csv"):
             return pd.read_csv(StringIO("".join(self.csv())))
-        table = self.table() if hasattr(self, "table") else next(p for p in self.document() if isinstance(p, Table))
+        table = self.table() if hasattr(self, "table") else next(p for p in parts(self) if isinstance(p, Table))
         return pd.DataFrame(list(table.cells), columns=[column.key or column.head for column in table.columns])

@@ -17,7 +17,6 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design.shapes import rect, tri
 
-GEOMETRY, GEOMETRY_SOURCE = "thesis-3.1.2", "Thesis 3.1.2 and figures 6.7 and 6.10"
 SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.24, 3.34, 3.35, 3.49 and 3.55"
 COST = 0
 

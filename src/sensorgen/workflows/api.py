@@ -15,15 +15,18 @@ from sensorgen.analysis.fit import fit as fit_values
 from sensorgen.analysis.fit.estimates import Fit
 from sensorgen.checks.review import Review
 from sensorgen.core import files
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design import design as designs
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.settings import varied
-from sensorgen.measure.log import Log
+from sensorgen.measure.log import Log, Reading
 from sensorgen.prediction import bodies, compression, evaluate
 from sensorgen.prediction import capacitance_answer as at_rest
+from sensorgen.prediction.calibration import inversion
 from sensorgen.prediction.calibration.calibration import Calibration
+from sensorgen.prediction.calibration.inversion import InvertedPresses
+from sensorgen.prediction.calibration.rest import Rest
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
 from sensorgen.prediction.loaded import Loaded, PredictedPoint, loaded
 from sensorgen.prediction.loaded import sweep as predicted_sweep
@@ -358,16 +361,23 @@ def report(log: Log, iteration: int | None = None, *specimens: str, path: str | 
     from sensorgen.analysis import report as reports
 
     file = Path(path)
+    how = file.suffix.lstrip(".") or "html"
+    if how not in reports.FORMATS:
+        raise UnknownName("format of a report", how, reports.FORMATS)
     compared = reports.report(log, iteration, specimens=specimens)
     with files.replacing(file) as target:
-        target.writelines(piece.encode() for piece in reports.pieces(compared, file.suffix.lstrip(".") or "html"))
+        target.writelines(piece.encode() for piece in reports.pieces(compared, how))
     return compared
 
 
-def invert(what: Design | Body, frequency_hz: Sequence[float], impedance_ohm: ArrayLike, *, noise: float) -> Estimates:
-    """Force and position from measured impedances, as if the sensor were exactly as predicted.
+def invert(
+    what: Design | Body, frequency_hz: Sequence[float], impedance_ohm: ArrayLike, *, rest_ohm: ArrayLike = (),
+    noise: float | None = None, perfect: bool = False,
+) -> InvertedPresses | Estimates:  # fmt: skip
+    """Force and position from measured impedances, by what the design alone allows.
 
-    A real specimen is not: :func:`calibrate` it.
+    The intervals hold all that a specimen of the design may differ in; known presses make them several times narrower
+    (:func:`calibrate`).
 
     Parameters
     ----------
@@ -376,29 +386,50 @@ def invert(what: Design | Body, frequency_hz: Sequence[float], impedance_ohm: Ar
     frequency_hz : (m,) sequence of float
         Frequencies [Hz].
     impedance_ohm : (n, m) complex array
-        Readings [ohm].
-    noise : float
-        Standard deviation of Re Z and of Im Z of a reading, relative to abs(Z) [-].
+        Readings under load [ohm].
+    rest_ohm : (m,) or (k, m) complex array
+        Readings with nothing on the sensor, just before [ohm]: what counts is the ratio to their mean.
+    noise : float, optional
+        Standard deviation of Re Z and of Im Z of a reading, relative to abs(Z) [-]; by the scatter of eight or more
+        readings at rest, else 0.1 %, if not given.
+    perfect : bool
+        As if the sensor were exactly as predicted, and no reading at rest were needed: a real one is not.
 
     Returns
     -------
-    Estimates
-        Force [N] and position [m] of each reading with their covariance and status.
+    InvertedPresses, or Estimates of a perfect sensor
+        Force [N] and position [m] of each reading with their 90 % intervals and a verdict.
+
+    Raises
+    ------
+    BadInput
+        No readings at rest; arrays of other shapes.
 
     Examples
     --------
     >>> plate = Design(shape="reference")
-    >>> measured = predict(plate, force_n=[2.0], position_mm=[30.0]).impedance.impedance_ohm.reshape(1, -1)
-    >>> found = invert(plate, TONES_HZ, measured, noise=1e-6)
-    >>> round(float(found.force_n[0]), 2), round(float(found.position_m[0]), 3)
-    (2.0, 0.03)
+    >>> points = predict(plate, force_n=[0.0, 9.0], position_mm=[30.0]).impedance.impedance_ohm  # tone, force, position
+    >>> found = invert(plate, TONES_HZ, points[:, 1].T, rest_ohm=points[:, 0].T, noise=1e-4)
+    >>> bool(found.force_90_n[0, 0] < 9.0 < found.force_90_n[0, 1])
+    True
     """
     if isinstance(what, Design) and what.layout:
         raise BadInput(
             "an array has many presses at once; expected its frames in a file, by the command sensorgen invert"
         )
+    z, at_rest = np.asarray(impedance_ohm, complex), np.atleast_2d(np.asarray(rest_ohm, complex))
+    if not perfect and at_rest.shape[1] != len(frequency_hz):
+        raise BadInput(
+            f"rest_ohm of shape {np.shape(rest_ohm)}; expected readings with nothing on the sensor, a column for each "
+            f"of the {len(frequency_hz)} frequencies (or perfect=True, as if the sensor were as predicted)"
+        )
     model, _ = sensor_model(_body(what))
-    return Estimator(model.sensor, tuple(frequency_hz), noise).batch(np.asarray(impedance_ohm))
+    if perfect:
+        return Estimator(model.sensor, tuple(frequency_hz), NOISE if noise is None else noise).batch(z)
+    rest = Rest(at_rest)
+    one = rest.noise() if noise is None else noise
+    by = inversion.of_design(model, np.asarray(frequency_hz, float), rest, one * np.sqrt(1 + 1 / len(at_rest)))
+    return by.batch(np.log(z / rest.mean()[0]))
 
 
 def calibrate(log: Log, *specimens: str, bench: Bench | None = None) -> list[Calibration]:
@@ -412,11 +443,15 @@ def calibrate(log: Log, *specimens: str, bench: Bench | None = None) -> list[Cal
 
 def compare(log: Log, iteration: int) -> Comparison:
     """Readings of an iteration beside the predictions of their designs; as :func:`of_iteration`."""
+    if not any(True for _ in log.about(Reading, iteration)):
+        raise BadInput(f"no readings of iteration {iteration} in the log; expected another, as Log.readings() shows")
     return of_iteration(log, iteration)
 
 
 def fit(log: Log, *specimens: str, iteration: int | None = None) -> Fit:
     """Material values by what was measured of specimens or of an iteration; as :func:`sensorgen.analysis.fit.fit`."""
+    if specimens and iteration is not None:
+        raise BadInput(f"iteration={iteration} beside specimens; expected one of the two")
     return fit_values(log, iteration, specimens=specimens)
 
 

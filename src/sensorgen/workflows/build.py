@@ -14,7 +14,7 @@ from sensorgen.checks.review import Step, draw, report
 from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.cache import Unknown, only_known
-from sensorgen.core.display import Boundless
+from sensorgen.core.display import Boundless, Displayed
 from sensorgen.core.document import Part, apart
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.findings import Finding, headline, listed, most_severe
@@ -41,7 +41,7 @@ STEPS = ("meshes", "checks", "validity", "prediction", "3MF", "profiles", "drawi
 
 
 @dataclass(frozen=True)
-class Built(Boundless):
+class Built(Boundless, Displayed):
     """Results of a build.
 
     Attributes

@@ -5,16 +5,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sensorgen.analysis.comparison import Comparison
+from sensorgen.analysis.fit.estimates import Fit
 from sensorgen.checks.review import Review
 from sensorgen.core import display, document, findings
 from sensorgen.design.design import Design
+from sensorgen.prediction.calibration.calibration import Calibration
+from sensorgen.prediction.calibration.inversion import InvertedPresses
+from sensorgen.prediction.capacitance_answer import CellCapacitance
 from sensorgen.prediction.compression import CompressionResult
+from sensorgen.prediction.inverse.estimator import Estimates
 from sensorgen.prediction.loaded import Loaded
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.sweep import Sweep
+from sensorgen.workflows.build import Built
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from sensorgen.core.document import Part
 
 
 @display.html.register(Review)
@@ -39,6 +48,7 @@ def _figure(name: str, of: Any) -> "Figure":
 
 for _kind, _name in (
     (Review, "findings"), (Sweep, "sweep"), (CompressionResult, "compression_figure"), (Prediction, "ranges"),
+    (CellCapacitance, "tried"), (Fit, "fitted"), (InvertedPresses, "presses"), (Estimates, "presses"),
 ):  # fmt: skip
     display.figure.register(_kind, partial(_figure, _name))
 
@@ -50,3 +60,32 @@ def _(of: Loaded) -> "Figure":
     z = of.impedance
     axes = (np.asarray(z.force_n), np.asarray(z.position_mm))
     return static.whole(results.lines(z.frequency_hz, *axes, z.impedance_ohm, of.prediction.design))
+
+
+@display.figure.register(Built)
+def _(of: Built) -> "Figure":
+    return _figure("ranges", of.prediction)
+
+
+@display.parts.register(Comparison)
+def _(of: Comparison) -> "tuple[Part, ...]":
+    from sensorgen.analysis.report import electrodes, yields
+
+    tables = (electrodes.readings(of), yields.table(of)) if of.direct else ()
+    return (*electrodes.headline(of), *yields.headline(of), *tables)
+
+
+@display.figure.register(Comparison)
+def _(of: Comparison) -> "Figure":
+    from sensorgen.analysis.plots import static
+    from sensorgen.analysis.report import electrodes
+
+    return static.first(of, electrodes.figures(of))
+
+
+@display.figure.register(Calibration)
+def _(of: Calibration) -> "Figure":
+    from sensorgen.analysis.calibration import page
+    from sensorgen.analysis.plots import static
+
+    return static.whole(page.learnt(of))

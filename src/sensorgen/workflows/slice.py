@@ -9,6 +9,7 @@ from sensorgen.checks import volumes
 from sensorgen.checks.review import review
 from sensorgen.core import document
 from sensorgen.core import files as store
+from sensorgen.core.display import Displayed
 from sensorgen.core.document import Part
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.findings import Finding, Verdict, headline, listed
@@ -24,7 +25,7 @@ from sensorgen.workflows.trial import Adjustment, compensation
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlicedFile(SliceReport):
+class SlicedFile(SliceReport, Displayed):
     """G-code of a design, as in the JSON beside it.
 
     Attributes

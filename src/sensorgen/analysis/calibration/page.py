@@ -21,7 +21,7 @@ def html(works: Sequence[CalibrationWork | Recheck]) -> str:
     sections = []
     for number, one in enumerate(works):
         fit = (*_presses(one, number), *_left_over(one, number)) if isinstance(one, CalibrationWork) else ()
-        figures, specimen = (*fit, _parameters(one.calibration, number)), document.visible(one.calibration.specimen)
+        figures, specimen = (*fit, learnt(one.calibration, number)), document.visible(one.calibration.specimen)
         sections.append(pages.PageSection(f"specimen-{number}", specimen, figures, tuple(one.document())))
     return pages.page(f"Calibration of {', '.join(section.title for section in sections)}", (), sections)
 
@@ -80,7 +80,7 @@ def _left_over(work: CalibrationWork, number: int) -> list[Figure]:
     return figures
 
 
-def _parameters(calibration: Calibration, number: int) -> Figure:
+def learnt(calibration: Calibration, number: int = 0) -> Figure:
     """Posterior of every parameter beside its prior, in standard deviations of the prior."""
     p, names = calibration.posterior, calibration.model.names
     sd = np.sqrt(np.diag(p.covariance))

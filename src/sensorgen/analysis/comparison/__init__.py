@@ -10,6 +10,7 @@ from math import inf, isfinite, isnan, log, nan
 from sensorgen.analysis.comparison.expected import Predicted, stored_or_made
 from sensorgen.analysis.comparison.measured import Measured, readings
 from sensorgen.core.bounds import Bounds
+from sensorgen.core.display import Displayed
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.lazy import Lazy
 from sensorgen.core.units import M_PER_MM
@@ -66,7 +67,10 @@ class Compared:
     residual: float = field(init=False)
 
     def __post_init__(self) -> None:
-        ry, expected = self.verdict.ry_ohm, self.predicted.along_ohm(self.across_ohm) if self.predicted else None
+        ry = min(self.evidence.ry_ohm, default=nan)
+        expected = self.predicted.along_ohm(self.across_ohm) if self.predicted else None
+        if expected and self.reading.words.wires == 4:  # which reads the electrode without leads
+            expected = expected.alone()
         object.__setattr__(self, "expected_ohm", expected)
         residual = log(ry / expected.value) if expected and isfinite(ry) and ry > 0 else nan
         object.__setattr__(self, "residual", residual)
@@ -83,13 +87,11 @@ class Compared:
         expected = self.expected_ohm
         if expected is None or not self.evidence.ry_ohm:
             return None
-        if self.reading.words.wires == 4:
-            expected = expected.alone()
         return any(expected.lower <= value <= expected.upper for value in self.evidence.ry_ohm)
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Displayed):
     """An iteration.
 
     Attributes
@@ -172,15 +174,41 @@ def of_iteration(
     of_rows = [expected.get(names.get(reading.specimen, "")) for reading in measured.rows]
     usual_ohm = _usual_ohm(measured.rows, of_rows)
 
+    partner = _partners(measured.rows)
+
     def compared(place: int) -> Compared:
         reading, of = measured.rows[place], of_rows[place]
         evidence = _evidence(reading, of, usual_ohm(reading.shape, of))
-        return Compared(reading, of, evidence, verdict(evidence, _intact_ohm(of, reading.words.instrument)))
+        both = evidence
+        if place in partner:
+            other = _evidence(measured.rows[partner[place]], of)
+            both = replace(evidence, ry_ohm=evidence.ry_ohm or other.ry_ohm, rz_ohm=evidence.rz_ohm or other.rz_ohm)
+        return Compared(reading, of, evidence, verdict(both, _intact_ohm(of, reading.words.instrument)))
 
     places = range(len(measured.rows))
     rows = Lazy([compared(k) for k in places].__getitem__ if len(places) <= _MOST_HELD else compared, places)
     ac = {reading.number for reading in measured.alternating}
     return Comparison(rows, measured.alternating, built, names, expected, (*left_out, *_first(_unused(rows, ac))))
+
+
+def _partners(rows: Iterable[Measured]) -> dict[int, int]:
+    """Places of readings along or across alone, each with that of the specimen's other resistance in the same state.
+
+    The latest before it counts, else the next.
+    """
+    partner, latest = dict[int, int](), dict[tuple[str, bool | None, bool], int]()
+    waiting: dict[tuple[str, bool | None, bool], list[int]] = defaultdict(list)
+    for place, reading in enumerate(rows):
+        for along, ohm, other in ((True, reading.y_ohm, reading.z_ohm), (False, reading.z_ohm, reading.y_ohm)):
+            key = reading.specimen, reading.words.baked, along
+            if ohm:
+                latest[key] = place
+                partner |= dict.fromkeys(waiting.pop(key, ()), place)
+            elif other and key in latest:
+                partner[place] = latest[key]
+            elif other:
+                waiting[key].append(place)
+    return partner
 
 
 def _labelled(by_specimen: Mapping[str, Design]) -> tuple[dict[str, str], dict[str, Design]]:
@@ -326,7 +354,10 @@ def _usual_ohm(
 
 def _evidence(reading: Measured, of: Predicted | None, expected_ohm: float = nan) -> Evidence:
     """Readings that a resistance can have; a slip below 0 is kept in the log, with a doubt."""
-    ry, rz = (tuple(v for v in values if v >= 0) for values in (reading.y_ohm, reading.z_ohm))
+    ry, rz = (
+        values if min(values, default=0.0) >= 0 else tuple(v for v in values if v >= 0)
+        for values in (reading.y_ohm, reading.z_ohm)
+    )
     return Evidence(reading.specimen, ry, rz, expected_ohm, of is not None and of.touches, reading.words.batch)
 
 
@@ -347,7 +378,7 @@ def _unused(rows: Iterable[Compared], alternating: Container[int]) -> Iterator[t
         missing = [of for of, ohm in (("R_Y", row.reading.y_ohm), ("R_Z", row.reading.z_ohm)) if not ohm]
         if len(missing) == 2:
             yield name, "no measurement in it"
-        elif missing:
+        elif missing and row.verdict.word == "unknown":
             yield name, f"no {missing[0]}: counts for nothing where both are needed"
         if any(value < 0 for value in (*row.reading.y_ohm, *row.reading.z_ohm)):
             yield name, "a resistance below 0 is no reading"
@@ -355,11 +386,15 @@ def _unused(rows: Iterable[Compared], alternating: Container[int]) -> Iterator[t
 
 @dataclass(frozen=True, slots=True)
 class AllowedValues:
-    """ln of the resistivities [ohm m] that a reading allows, and of the leak per area [S/m2]; nan where unknown."""
+    """ln of resistivities [ohm m] that a reading allows, and of the leak per area [S/m2]; nan unknown, -inf tight.
+
+    ``print`` is the plate of the specimen, "" where that is unknown.
+    """
 
     low: float
     high: float
-    leak: float
+    leak: float = nan
+    print: str = ""
 
 
 def usable(row: Compared) -> bool:
@@ -383,9 +418,10 @@ def allowed(row: Compared, body: Body) -> AllowedValues | None:
         (this, *electrode_and_leak(ry, inf if isnan(rz) else rz, other.value / this.value))
         for this, other in zip(ends, ends[::-1], strict=True)
     ]
-    leak = max(leak for *_, leak in known)
+    leak = nan if isnan(rz) else max(leak for *_, leak in known)
     low, high = min(ohm / this.upper for this, ohm, _ in known), max(ohm / this.lower for this, ohm, _ in known)
-    return AllowedValues(log(low), log(high), log(leak / area) if 0 < leak < inf else nan)
+    ln_leak = nan if not leak < inf else log(leak / area) if leak else -inf
+    return AllowedValues(log(low), log(high), ln_leak, row.evidence.plate)
 
 
 @lru_cache(maxsize=64)

@@ -126,7 +126,7 @@ class RecordedRun(DrawnRecording):
     samples, valid : int
         Samples, and valid ones.
     seconds : float
-        Time of the last sample [s].
+        From the first sample to the last [s].
     rest_ohm, rest_error_ohm : (m,) array
         Impedance at rest, and its standard error: of R in the real, of X in the imaginary part [ohm].
     noise_ohm : (m,) array
@@ -227,5 +227,5 @@ def _of_part(entry: BenchRun, lockins: "Sequence[Recording]", pressed: "RigLog |
         yield RecordedRun(
             _name(entry, one.source), one.tones_hz, one.time_s[raw], one.impedance_ohm[raw], done.filtered_s[smooth],
             done.filtered_ohm[smooth], done.pairs if done.by_force else None, entry, one.source, counts["samples"],
-            counts["valid"], float(one.time_s[-1]), rest, spread, scatter, notes,
+            counts["valid"], float(np.ptp(one.time_s)), rest, spread, scatter, notes,
         )  # fmt: skip

@@ -71,7 +71,7 @@ def fit(
     left_out = list(comparison.left_out)
     step("recordings")
     measured = list(_measured(log, (iteration, specimens), comparison, bench or Bench(), body_of, left_out))
-    allowing = list(_allowing(comparison))
+    allowing = list({row.reading.specimen: (row, reading) for row, reading in _allowing(comparison)}.values())
     data = _FitData([(row.reading.specimen, reading) for row, reading in allowing if usable(row)], measured)
     names = sorted(data.specimens())
     if not names:
@@ -100,7 +100,7 @@ class _FitData:
     Attributes
     ----------
     readings : sequence of (str, AllowedValues)
-        Readings along sound electrodes, each with its specimen.
+        The last reading along the electrodes of each specimen where these are sound.
     measured : sequence of (SpecimenEntries, str)
         Specimens that the bench or an LCR meter has measured, each with the name of its print.
     """
@@ -166,16 +166,16 @@ def _fitted(
     data: _FitData, comparison: Comparison, design: Design, seed: int
 ) -> tuple[list[Fitted], list[Untold]]:  # fmt: skip
     """All values and all that stays open; of two values of one quantity the one that is known better."""
-    readings = [reading for _, reading in data.readings]
     fits = [
         estimates.of_specimen(one, print_, Movable(comparison.bodies[comparison.names[one.specimen]]))
         for one, print_ in data.measured
     ]
     electrode, film = design.slot("top_electrode")[0].name, design.slot("film")[0].name
+    readings, by_ac = dict(data.readings), estimates.along(fits)  # AC readings of one specimen tell, as the bench's do
     results = [
-        estimates.resistivity(readings, electrode),
+        estimates.resistivity([*(readings | by_ac).values()], electrode, 1 if by_ac else estimates.LEAST),
         *estimates.values(fits),
-        estimates.leak(readings, film, seed),
+        estimates.leak([*readings.values()], film, seed),
     ]
     best = dict[tuple[str, str], Fitted]()
     for one in results:

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
-from math import exp, inf, isfinite, log, pi, sqrt
+from math import exp, inf, isnan, log, pi, sqrt
 from typing import Annotated
 
 import numpy as np
@@ -17,6 +17,7 @@ from sensorgen.analysis.calibration import SpecimenEntries
 from sensorgen.analysis.comparison import AllowedValues
 from sensorgen.analysis.comparison.expected import PERMITTIVITY, Movable
 from sensorgen.core.arrays import Real
+from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.lazy import by_key
 from sensorgen.core.version import __version__
@@ -92,7 +93,7 @@ class GroupError:
 
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(Displayed):
     """A fit.
 
     Attributes
@@ -191,32 +192,48 @@ def text(fit: Fit) -> str:
 
 
 RESISTIVITY = "resistivity_ohm_m"
-LEAST = 3  # readings that a scatter can be told from
+LEAST = 3  # specimens that a scatter can be told from
+_OF_PRINTS = log(1.45), 35  # scatter of ln of the resistivity of prints and its degrees, by Table D.1 of the thesis
 _DRAWS = 2000
 _PROPERTY = 10.0  # leaks that scatter by more than this factor about their median are no property of a material
 
 
-def resistivity(readings: Sequence[AllowedValues], material: str) -> Fitted | Untold:
+def resistivity(specimens: Sequence[AllowedValues], material: str, least: int = LEAST) -> Fitted | Untold:
     """One resistivity for both electrodes: the median of prints, and the interval that holds 95 % of other prints.
 
-    The interval is Student's for one more print, by the scatter of ln of the resistivity; it holds at least the medians
-    of what single readings leave open.
+    The interval is Student's for one more specimen of one more print, by the scatter of ln of the resistivity of prints
+    and within them; of fewer than three prints that of the thesis's. It holds at least the medians of what specimens
+    leave open.
     """
     from scipy.special import stdtrit
 
-    count = len(readings)
-    if count < LEAST:
-        return Untold(f"{RESISTIVITY} along", f"{count} readings of sound electrodes; expected {LEAST} or more")
-    low, high = np.array([(r.low, r.high) for r in readings]).T
+    count = len(specimens)
+    if count < least:
+        return Untold(f"{RESISTIVITY} along", f"{_specimens(count)} with sound electrodes; expected {least} or more")
+    low, high = np.array([(one.low, one.high) for one in specimens]).T
     at = (low + high) / 2
-    middle, scatter = float(np.median(at)), float(np.std(at, ddof=1))
-    reach = float(stdtrit(count - 1, (1 + LEVEL) / 2)) * scatter * sqrt(1 + 1 / count)
+    prints = by_key((one.print or str(k), at[k]) for k, one in enumerate(specimens))
+    means = np.array([np.mean(of) for of in prints.values()])
+    within = sum(float(((of - np.mean(of)) ** 2).sum()) for of in prints.values()) / count
+    between = float(np.var(means, ddof=1)) if len(means) >= LEAST else _OF_PRINTS[0] ** 2
+    degrees = len(means) - 1 if len(means) >= LEAST else _OF_PRINTS[1]
+    middle, scatter = float(np.median(means)), sqrt(between + within)
+    reach = float(stdtrit(degrees, (1 + LEVEL) / 2)) * scatter * sqrt(1 + 1 / len(means))
     return Fitted(
         material, RESISTIVITY, exp(middle), exp(min(middle - reach, np.median(low))),
         exp(max(middle + reach, np.median(high))),
-        f"R_Y and R_Z of {count} specimens, along the electrode: the median; the interval holds 95 % of prints, which "
-        f"scatter by a factor of {exp(scatter):.3g} (one standard deviation)",
+        f"{_specimens(count)} of {len(means)} print{'s' * (len(means) != 1)}, along the electrode: the median; the "
+        f"interval holds 95 % of prints, which scatter by a factor of {exp(scatter):.3g} (one standard deviation)",
     )  # fmt: skip
+
+
+def along(fits: "Sequence[OfSpecimen]") -> dict[str, AllowedValues]:
+    """Resistivities along electrodes that AC readings allow, by specimen."""
+    known = (
+        (fit, at + log(fit.of.model.sensor.common_resistivity_ohm_m()), _SURE * error)
+        for fit, at, error in _sure(fits, "resistivity")
+    )
+    return {fit.name: AllowedValues(at - reach, at + reach, print=fit.print_) for fit, at, reach in known}
 
 
 def by_group(groups: Mapping[str, Sequence[tuple[AllowedValues, bool]]], material: str) -> Iterator[GroupError]:
@@ -254,9 +271,11 @@ def _medians(values: Real, seed: int) -> Real:
 
 def leak(readings: Sequence[AllowedValues], material: str, seed: int) -> Fitted | Untold:
     """Leak per area, where it scatters little enough to be anything of the material's."""
-    known = np.array([r.leak for r in readings if isfinite(r.leak)])
+    known = np.array([r.leak for r in readings if not isnan(r.leak)])
     if len(known) < LEAST:
-        return Untold("leak", f"{len(known)} readings of films that leak; expected {LEAST} or more")
+        return Untold("leak", f"{len(known)} readings of films; expected {LEAST} or more")
+    if tight := np.isinf(known).sum():
+        return Untold("leak", f"{tight} of {len(known)} films are tight: no property of {material}")
     middle, spread = float(np.median(known)), float(np.exp(np.median(np.abs(known - np.median(known)))))
     if spread > _PROPERTY:
         least, most = np.exp(known.min()), np.exp(known.max())
@@ -365,7 +384,7 @@ def values(fits: Sequence[OfSpecimen]) -> list[Fitted | Untold]:
         none = "no recording of the bench: resistances at direct current do not depend on it"
         return [Untold(PERMITTIVITY, none), Untold(MODULUS, none)]
     film = fits[0].of.film
-    return [_resistivity(fits), _permittivity(fits, film), _modulus(fits, film), _leak(fits, film)]
+    return [_permittivity(fits, film), _modulus(fits, film), _leak(fits, film)]
 
 
 def _sure(fits: Sequence[OfSpecimen], name: str) -> list[tuple[OfSpecimen, float, float]]:
@@ -386,25 +405,15 @@ def _specimens(count: int) -> str:
     return f"{count} specimen{'s' * (count != 1)}"
 
 
-def _resistivity(fits: Sequence[OfSpecimen]) -> Fitted | Untold:
-    along = [
-        (fit, (at + log(fit.of.model.sensor.common_resistivity_ohm_m()), error))
-        for fit, at, error in _sure(fits, "resistivity")
-    ]
-    if not along:
-        return Untold("resistivity_ohm_m along", "no reading of a specimen depends on it")
-    note = f"Re Z of {_specimens(len(along))}: one value for both electrodes, along them"
-    electrode = fits[0].of.body.design.slot("top_electrode")[0].name
-    return _value(electrode, "resistivity_ohm_m", _of_prints(along), note, len(along))
-
-
 def _modulus(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
     pressed = [
         (fit, (at + log(t.value), error)) for fit, at, error in _sure(fits, "stiffness")
         for t in fit.of.model.values if t.material == film and t.quantity == MODULUS
     ]  # fmt: skip
     if not pressed:
-        return Untold(MODULUS, "no recording with presses whose force and position are known")
+        known = any(fit.stiffness for fit in fits)
+        none = "no recording with three presses whose force and position are known"
+        return Untold(MODULUS, "known presses do not determine it" if known else none)
     law = f"by the law of compression {fits[0].of.model.sensor.compression.name}; all moduli move together"
     return _value(
         film, MODULUS, _of_prints(pressed), f"presses of {_specimens(len(pressed))}, {law}", len(pressed)

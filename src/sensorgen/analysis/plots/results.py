@@ -21,6 +21,7 @@ from sensorgen.analysis.plots.figure import (
     Figure,
     Map,
     Panel,
+    Values,
     frequency,
     look,
     scale,
@@ -32,14 +33,17 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.core.lazy import by_key
 from sensorgen.core.units import M_PER_MM
 from sensorgen.models.sensor import Response, Sensor
+from sensorgen.prediction.capacitance_answer import CellCapacitance
 from sensorgen.prediction.compression import CompressionResult
 from sensorgen.prediction.identifiability.fisher import LeastErrors, Setup, bounds, required, slopes
 from sensorgen.prediction.identifiability.identify import surface
+from sensorgen.prediction.inverse.verdict import Presses
 from sensorgen.prediction.query import FORCE_N, NOISE
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.sweep import Sweep
 
 if TYPE_CHECKING:
+    from sensorgen.analysis.fit.estimates import Fit
     from sensorgen.solvers.sheet.parts import Port, Sheet
     from sensorgen.solvers.sheet.solve import PressErrors
 
@@ -170,6 +174,51 @@ def compression_figure(result: CompressionResult) -> Figure:
     conditions = ", ".join(f"{key} {value}" for key, value in result.held.items())
     alt = "Displacement of the top and capacitance per area over stress."
     return Figure("compression", f"{result.model}: {conditions}", alt, {"": tuple(panels)}, columns=2)
+
+
+def tried(cell: CellCapacitance) -> Figure:
+    """Time and accuracy of the models of a cell: of those that ran, and of others as their benchmarks let expect."""
+    curves = []
+    for colour, one in zip(COLOURS, cell.plan, strict=False):
+        if one.seconds and one.width:
+            curves.append(Curve("points", one.model, [one.seconds], [one.width], colour=colour))
+        elif one.expected_seconds and one.expected_width:
+            x, y = [one.expected_seconds], [one.expected_width]
+            curves.append(Curve("points", f"{one.model}, expected", x, y, colour=colour, symbol="circle-open"))
+    panel = Panel(tuple(curves), Axis("time [s]", log=True), Axis("width of the bounds, relative", log=True))
+    alt = "Time and relative width of the bounds of each model."
+    return Figure("models", f"{cell.design}, {cell.body}: by {cell.model}", alt, {"": (panel,)})
+
+
+def fitted(fit: "Fit") -> Figure:
+    """Fitted values with their intervals, relative to the values."""
+    names = [f"{v.quantity} of {v.material}: {v.value:.3g}" for v in fit.values]
+    low, high = ([getattr(v, end) / v.value for v in fit.values] for end in ("low", "high"))
+    panel = Panel((Curve("points", "", [1.0] * len(names), names, low, high),), Axis("times the value", log=True),
+                  Axis(names=tuple(names)))  # fmt: skip
+    return Figure("values", f"Fitted to {fit.of}", "Values with their intervals.", {"": (panel,)})
+
+
+_MOST_NAMES = 40  # readings that are numbered each
+
+
+def presses(of: Presses) -> Figure:
+    """Force and position behind readings, with their 90 % intervals."""
+    number: Values = np.arange(1.0, len(of.force_n) + 1)
+    names = tuple(map(str, range(1, len(of.force_n) + 1))) if len(of.force_n) <= _MOST_NAMES else ()
+    panels = tuple(
+        Panel(
+            (Curve("points", "", values, names or number, ends[:, 0], ends[:, 1]),),
+            Axis(name),
+            Axis("reading", names=names),
+        )
+        for name, values, ends in (
+            ("force [N]", of.force_n, of.force_90_n),
+            ("position [mm]", of.position_m / M_PER_MM, of.position_90_m / M_PER_MM),
+        )
+    )
+    alt = "Force and position of each reading with the ends of their 90 % intervals."
+    return Figure("presses", f"{len(number)} readings", alt, {"": panels}, columns=2)
 
 
 _LEAST = 1 / 30  # of the error without information, at which the colours begin

@@ -43,6 +43,13 @@ def whole(figure: Figure) -> "Drawn":
         return drawn(figure, tuple(p for panels in figure.choices.values() for p in panels), figure.title)
 
 
+def first(of: object, figures: Sequence[Figure]) -> "Drawn":
+    """The first of a result's figures as matplotlib has it; TypeError where it has none."""
+    if not figures:
+        raise TypeError(f"this {type(of).__name__} has nothing to draw")
+    return whole(figures[0])
+
+
 def files(figure: Figure) -> Iterator[tuple[str, bytes]]:
     """Name and content of a figure's files: each of its choices as PNG and as SVG."""
     for k, (choice, panels) in enumerate(figure.choices.items()):

@@ -21,8 +21,8 @@ from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, BodyT
 from sensorgen.analysis.plots.pages import Drawing, PageSection
 from sensorgen.analysis.report import alternating, electrodes, explained, history, recordings, yields
 from sensorgen.checks.review import draw
-from sensorgen.core import yamlfile
-from sensorgen.core.document import Column, Table, csv_row, plain, safe, spreadsheet
+from sensorgen.core import display, yamlfile
+from sensorgen.core.document import Column, Part, Table, csv_row, plain, safe, spreadsheet
 from sensorgen.core.document import markdown as document
 from sensorgen.core.errors import BadInput
 from sensorgen.core.lazy import by_key
@@ -108,7 +108,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class Report(display.Displayed):
     """A report.
 
     Attributes
@@ -140,6 +140,11 @@ class Report:
         which = f"Iteration {self.iteration}" if self.iteration is not None else "All specimens"
         return f"{', '.join(self.specimens) or which}: predicted and measured"
 
+    def document(self) -> Iterator[Part]:
+        """Headline, findings and tables."""
+        yield from (*self.headline, *self.findings)
+        yield from self.tables
+
     @property
     def figures(self) -> tuple[Figure, ...]:
         """All figures."""
@@ -149,6 +154,13 @@ class Report:
     def tables(self) -> tuple[Table, ...]:
         """All tables."""
         return tuple(table for section in self.sections for table in section.tables)
+
+
+@display.figure.register(Report)
+def _(of: Report) -> Any:
+    from sensorgen.analysis.plots import static
+
+    return static.first(of, of.figures)
 
 
 def report(
@@ -173,7 +185,7 @@ def report(
         The log has no readings of the iteration, or of a specimen.
     """
     step("readings")
-    specimens = tuple(named(name, log).specimen for name in specimens)
+    specimens = tuple(dict.fromkeys(named(name, log).specimen for name in specimens))
     comparison = of_iteration(log, iteration, step, specimens=specimens)
     left_out = list(comparison.left_out)
     step("recordings")

@@ -6,14 +6,14 @@ from math import isfinite, nan
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from sensorgen.analysis.comparison import Compared, Comparison
-from sensorgen.analysis.report.alternating import BAKED, AcRow, at_text
+from sensorgen.analysis.report.alternating import BAKED, F_PER_PF, AcRow, at_text
 from sensorgen.core.document import Cell, Column
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log import Log
 
 if TYPE_CHECKING:
-    from sensorgen.prediction.calibration.calibration import Calibration
+    from sensorgen.prediction.calibration.calibration import CalibratedValue, Calibration
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,9 @@ class CalibrationRow:
     specimen: Annotated[str, Column("specimen")]
     design: Annotated[str, Column("design")]
     presses: Annotated[int, Column("known presses")]
-    r_ratio: Annotated[float, Column("R", "", "over the predicted one")]
-    c_ratio: Annotated[float, Column("C", "", "over the predicted one")]
-    rise_ratio: Annotated[float, Column("rise of C at 4 N", "", "over the predicted one")]
+    r_ratio: Annotated[Cell, Column("R", "", "over the predicted one")]
+    c_ratio: Annotated[Cell, Column("C", "", "over the predicted one")]
+    rise_ratio: Annotated[Cell, Column("rise of C at 4 N", "", "over the predicted one")]
     scatter_percent: Annotated[float, Column("scatter of the rise", "%", digits=2)]
     force_covered: Annotated[str, Column("force covered")]
     position_covered: Annotated[str, Column("position covered")]
@@ -47,12 +47,20 @@ def latest(log: Log, specimens: Container[str], left_out: list[tuple[str, str]])
     return calibrated
 
 
+def _ratios(one: "Calibration") -> "list[tuple[CalibratedValue, float]]":
+    """R, C and the rise of C at 4 N, each with its prediction in the same unit."""
+    known, sensor = {value.name: value for value in one.values()}, one.model.sensor
+    c_pf = sensor.capacitance_f() / F_PER_PF
+    predicted = {"resistance": sensor.resistance_ohm(), "capacitance": c_pf, "rise at 4 N": 1.0}
+    return [(known[name], value) for name, value in predicted.items()]
+
+
 def calibration_row(one: "Calibration") -> CalibrationRow:
-    """Row of a calibration."""
-    values, held_out, sensor = {v.name: v.value for v in one.values()}, one.held_out, one.model.sensor
+    """Row of a calibration; of what its readings did not determine there is no ratio."""
+    held_out = one.held_out
+    r, c, rise = (known.value / value if known.by != "prediction" else None for known, value in _ratios(one))
     return CalibrationRow(
-        one.specimen, one.design, one.posterior.presses, values["resistance"] / sensor.resistance_ohm(),
-        values["capacitance"] * 1e-12 / sensor.capacitance_f(), values["rise at 4 N"], 100 * one.posterior.scatter,
+        one.specimen, one.design, one.posterior.presses, r, c, rise, 100 * one.posterior.scatter,
         f"{held_out.force} of {held_out.presses}" if held_out else "",
         f"{held_out.position} of {held_out.presses}" if held_out else "",
         held_out.force_width_n if held_out else None, held_out.position_width_m * 1e3 if held_out else None,
@@ -60,13 +68,15 @@ def calibration_row(one: "Calibration") -> CalibrationRow:
 
 
 def calibration_findings(calibrations: "Sequence[Calibration]") -> Iterator[str]:
-    """One sentence for each specimen."""
+    """A sentence for each specimen, of what its readings determine; and what is to be doubted of it."""
     for one in calibrations:
-        row = calibration_row(one)
-        yield (
-            f"{one.specimen} is calibrated by {row.presses} known presses: R {row.r_ratio:.3g}, C {row.c_ratio:.3g} "
-            f"and rise of C {row.rise_ratio:.3g} times the predicted ones."
-        )
+        told = (
+            f"{known.name} {known.value / value:.3g} ({known.lower / value:.3g} to {known.upper / value:.3g})"
+            for known, value in _ratios(one) if known.by != "prediction"
+        )  # fmt: skip
+        words = ", ".join(told) or "nothing that these readings determine"
+        yield f"{one.specimen} is calibrated by {one.posterior.presses} known presses; over the prediction: {words}."
+        yield from (f"{one.specimen}: {note}." for note in one.notes)
 
 
 _UNTOLD = None, "", ""  # bake, defects and remark of a reading of which none is known

@@ -16,6 +16,7 @@ from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import si
+from sensorgen.prediction.quantities import impedance_at
 from sensorgen.prediction.results import Impedance
 
 _SAME = 1e-6  # relative: frequencies nearer than this are the same
@@ -70,14 +71,12 @@ def impedances(recorded: Sequence[RecordedRun], comparison: Comparison) -> Table
     rows: list[ImpedanceRow] = []
     for run in recorded:
         of = comparison.predictions.get(comparison.names.get(run.entry.specimen, ""))
-        design, known, capacitance = (
-            (of.design, of.prediction.impedance, of.prediction.capacitance) if of else ("", (), None)
-        )
+        design, capacitance = (of.design, of.prediction.capacitance) if of else ("", None)
         c_pf = [None if c is None else c / F_PER_PF for c in _predicted(capacitance)]
         noise = np.hypot(run.noise_ohm.real, run.noise_ohm.imag) / np.abs(run.rest_ohm) / 2**0.5
         measured = zip(run.tones_hz.tolist(), run.rest_ohm, run.rest_error_ohm, noise.tolist(), strict=True)
         for f, z, error, share in measured:
-            e = next((e for e in known if abs(e.frequency_hz / f - 1) < _SAME), None)
+            e = impedance_at(of.prediction, f, of.losses) if of else None
             re, im = (e.re, e.im) if e else (None, None)
             off = _residual(complex(z), e)
             rows.append(ImpedanceRow(

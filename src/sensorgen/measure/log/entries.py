@@ -13,7 +13,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache, lru_cache
-from operator import eq
+from itertools import compress
+from operator import eq, itemgetter, ne
 from types import NoneType
 from typing import Any, Self, TypeVar, cast, get_args, get_type_hints
 
@@ -425,6 +426,7 @@ _PLAIN: dict[type[Entry], dict[str, type | None]] = {  # type that a field's val
     kind: {name: of if of in (str, int, bool) else None for name, ((_, of, _), _) in held.items()}
     for kind, held in _HELD.items()
 }
+_USUAL = {kind: {name: usual for name, (_, usual) in held.items()} for kind, held in _HELD.items()}
 _OPTIONAL = {kind: {f.name: f.default for f in fields(kind) if f.default is not MISSING} for kind in COLUMNS}
 _REQUIRED = {kind: {name for name, (_, usual) in held.items() if usual is MISSING} for kind, held in _HELD.items()}
 
@@ -437,9 +439,10 @@ def content_of(entry: Entry) -> dict[str, Any]:
     BadInput
         A value that the field cannot have.
     """
-    kind, row = type(entry), vars(entry)
-    types, plain = _HELD[kind], _PLAIN[kind]
-    data = {name: row[name] for name, (_, usual) in types.items() if row[name] != usual}
+    kind = type(entry)
+    types, plain, usual = _HELD[kind], _PLAIN[kind], _USUAL[kind]
+    row = itemgetter(*usual)(vars(entry))
+    data = dict(compress(zip(usual, row, strict=True), map(ne, row, usual.values())))
     for name, value in data.items():
         if type(value) is not plain[name]:
             _checked(name, types[name][0], list(value) if isinstance(value, tuple) else value, kind)

@@ -188,7 +188,8 @@ def of_recording(worked: Processed, rig: RigLog | None, files: Iterable[str] = (
     return RecordingResult(
         file=one.source.file, lockin=one.source.lockin, program=one.source.program or one.source.format,
         rate_hz=one.source.rate_hz, tones_hz=_values(one.tones_hz), counts=one.counts(),
-        rig=rig.counts() if rig else None, seconds=float(one.time_s[-1]), notes=worked.notes, by_force=worked.by_force,
+        rig=rig.counts() if rig else None, seconds=float(np.ptp(one.time_s)), notes=worked.notes,
+        by_force=worked.by_force,
         drift=float(abs(drift.at(one.time_s[-1:])).max()) if drift else None, drift_law=drift.law if drift else None,
         drift_reason=drift.reason if drift else None,
         presses=tuple(_press(pairs, i) for i in range(len(pairs.time_s))) if pairs else (),

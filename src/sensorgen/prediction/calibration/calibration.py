@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Mask, Real
+from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.models.compression import CapacitanceCurve, Plate
@@ -128,7 +129,7 @@ class CalibratedValue:
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class Calibration(Displayed):
     """A specimen's calibration.
 
     Attributes

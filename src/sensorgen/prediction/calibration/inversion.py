@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.prediction.calibration.fitting import Posterior, pairs, readings, usual_presses
-from sensorgen.prediction.calibration.rest import LOADS_N, STALE_S, load_probabilities
-from sensorgen.prediction.calibration.specimen import SpecimenModel
-from sensorgen.prediction.inference import NORMAL_90, Index, Samples, cramer_rao, parts, whitening
+from sensorgen.prediction.calibration.fitting import Posterior, by_rest, pairs, readings, usual_presses
+from sensorgen.prediction.calibration.rest import LOADS_N, STALE_S, Rest, load_probabilities
+from sensorgen.prediction.calibration.specimen import Bench, SpecimenModel, spread_of
+from sensorgen.prediction.inference import NORMAL_90, Index, cramer_rao, parts, whitening
 from sensorgen.prediction.inverse.estimator import Prior
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
-from sensorgen.prediction.inverse.verdict import Worded, chi2_limit
+from sensorgen.prediction.inverse.verdict import Presses, Worded, chi2_limit
+from sensorgen.prediction.sensor_model import SensorModel
 
 LEVEL = 0.9  # probability of the intervals
 _COARSE = 20, 16  # forces and positions at which covariances are worked out
@@ -74,7 +75,7 @@ class Verdict(Worded):
 
 
 @dataclass(frozen=True, eq=False)
-class InvertedPresses(Samples):
+class InvertedPresses(Presses):
     """Presses behind readings.
 
     Attributes
@@ -107,6 +108,10 @@ class InvertedPresses(Samples):
     stretches: Real
     tones: Index
     verdict: NDArray[np.uint8]
+
+    def statuses(self) -> list[str]:
+        """Verdict on each reading, in words."""
+        return Verdict.in_words(self.verdict)
 
 
 class _Readings(NamedTuple):
@@ -413,6 +418,38 @@ def doubt_rest(presses: InvertedPresses, rest: Mask, left: int) -> int:
     doubted = ~rest & ((count - last < _DOUBTED) | (following - count < _DOUBTED))
     presses.verdict[doubted] = np.maximum(presses.verdict[doubted], Verdict.LOADED_REST)
     return max(int(_DOUBTED - (count[-1] - last[-1])), 0) if len(count) else left
+
+
+def of_design(
+    predicted: SensorModel, frequency_hz: Real, rest: Rest, noise: Real | float,
+    prior: Prior | None = None, force_limit_n: float = FORCE_LIMIT_N,
+) -> Inverter:  # fmt: skip
+    """Inverter of a specimen of which nothing is known but its design and readings at rest.
+
+    Parameters
+    ----------
+    predicted : SensorModel
+        Of the design.
+    frequency_hz : (m,) array
+        Frequencies [Hz].
+    rest : Rest
+        Readings with nothing on the sensor.
+    noise : (m,) array or float
+        Standard deviation of the parts of a ratio to their mean [-].
+    prior, force_limit_n
+        As of :class:`Inverter`.
+
+    Raises
+    ------
+    BadInput
+        A frequency without a reading at rest.
+    """
+    mean, count = rest.mean()
+    if not np.isfinite(mean).all():
+        raise BadInput("a frequency without a reading at rest; expected one at each")
+    model = SpecimenModel(predicted.sensor, frequency_hz, spread_of(predicted, Bench()))
+    known = by_rest(model, np.log(mean), noise / count**0.5, noise)
+    return Inverter(model, known, prior, force_limit_n)
 
 
 def nothing(n: int) -> InvertedPresses:

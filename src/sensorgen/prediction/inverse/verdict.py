@@ -1,17 +1,20 @@
 """Statuses of estimates: one word per sample, the worst that applies, their counts, and rows of a CSV file."""
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from statistics import median
-from typing import Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Mask, Real
-from sensorgen.core.document import csv_row
-from sensorgen.prediction.inference import LocalFit
+from sensorgen.core.display import Displayed
+from sensorgen.core.document import Column, Part, Table, csv_row
+from sensorgen.core.units import M_PER_MM
+from sensorgen.prediction.inference import LocalFit, Samples
 
 
 class Worded(IntEnum):
@@ -33,6 +36,12 @@ class Worded(IntEnum):
         for status, applies in rules:
             statuses[applies] = status
         return statuses
+
+    @classmethod
+    def in_words(cls, numbers: NDArray[np.uint8]) -> list[str]:
+        """Words of statuses."""
+        members = list(cls)
+        return [members[number].words for number in numbers.tolist()]
 
 
 class Tally:
@@ -85,6 +94,40 @@ def rows(given: Sequence[Sequence[str]], numbers: Real, tones: NDArray[np.intp],
     cells = ((f"{value:.9g}" if abs(value) < np.inf else "" for value in row) for row in numbers.tolist())
     ends = zip(given, cells, map(str, tones.tolist()), words.tolist(), strict=True)
     return "".join(csv_row([*own, *row, *last]) for own, row, *last in ends)
+
+
+@dataclass(frozen=True)
+class PressRow:
+    """Press behind a reading, with 90 % intervals; nan where nothing was found."""
+
+    force_n: Annotated[float, Column("force", "N")]
+    force_low_n: Annotated[float, Column("force from", "N")]
+    force_high_n: Annotated[float, Column("force to", "N")]
+    position_mm: Annotated[float, Column("position", "mm")]
+    position_low_mm: Annotated[float, Column("position from", "mm")]
+    position_high_mm: Annotated[float, Column("position to", "mm")]
+    status: Annotated[str, Column("status")]
+
+
+class Presses(Samples, Displayed):
+    """Presses behind readings: force and position with the ends of their intervals, and a status."""
+
+    if TYPE_CHECKING:
+        force_n: Real
+        position_m: Real
+        force_90_n: Real
+        position_90_m: Real
+
+    def statuses(self) -> list[str]:
+        """Status of each reading, in words."""
+        raise NotImplementedError
+
+    def document(self) -> Iterator[Part]:
+        """A row for each reading."""
+        force, place = [self.force_n, *self.force_90_n.T], [self.position_m, *self.position_90_m.T]
+        columns = [*force, *(metres / M_PER_MM for metres in place)]
+        rows = [PressRow(*row) for row in zip(*(column.tolist() for column in columns), self.statuses(), strict=True)]
+        yield from Table.some("presses", "", rows)
 
 
 PAIR = 9.21  # 99 % of chi-squared with two degrees of freedom: force and position

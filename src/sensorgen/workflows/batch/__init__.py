@@ -11,6 +11,7 @@ from sensorgen.asprinted import agreement
 from sensorgen.asprinted import printed as asprinted
 from sensorgen.checks.review import Review, Step
 from sensorgen.core import files as store
+from sensorgen.core.display import Displayed
 from sensorgen.core.document import Part, to_json
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, Unprintable
 from sensorgen.core.findings import headline
@@ -67,7 +68,7 @@ class Arranged:
 
 
 @dataclass(frozen=True)
-class Batch:
+class Batch(Displayed):
     """Results of a batch.
 
     Attributes

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from statistics import geometric_mean
 from typing import Any
 
 from sensorgen.checks.volumes import LayerVolume
@@ -21,7 +22,7 @@ from sensorgen.workflows.sealed import seal
 RECORD = "batch.json"
 _COLUMNS = (
     Column("no.", key="order"), Column("specimen"), Column("design"), Column("x", "mm", key="x_mm"),
-    Column("y", "mm", key="y_mm"), Column("R", "ohm", key="resistance_ohm", si=True),
+    Column("y", "mm", key="y_mm"), Column("R of an electrode", "ohm", key="resistance_ohm", si=True),
     Column("C", "F", key="capacitance_f", si=True),
 )  # fmt: skip
 
@@ -227,10 +228,10 @@ class BatchRecord(Boundless):
 
 
 def _expected(prediction: Prediction) -> tuple[float | None, float | None]:
-    """Resistance of all electrodes and capacitance [ohm], [F]; None where nothing is predicted."""
+    """Resistance along an electrode, as a report has it, and capacitance [ohm], [F]; None where none is predicted."""
     if prediction.capacitance is None:
         return None, None
-    return sum(r.value for r in prediction.resistance.values()), prediction.capacitance.value
+    return geometric_mean(r.value for r in prediction.resistance.values()), prediction.capacitance.value
 
 
 def specimens(pieces: Sequence[PrintPiece], plate: Plate) -> dict[str, PlateSpecimen]:

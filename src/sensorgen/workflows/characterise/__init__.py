@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -21,8 +21,9 @@ from sensorgen.analysis.characterise.catalogue import (
 )
 from sensorgen.analysis.characterise.posterior import CouponPosterior, Interval95, physical, posterior, prior
 from sensorgen.analysis.plots.figure import BLUE, Axis, Curve, Figure, Panel
-from sensorgen.analysis.plots.static import files
+from sensorgen.analysis.plots.static import files, whole
 from sensorgen.checks.review import Step
+from sensorgen.core import display
 from sensorgen.core import files as store
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError
@@ -213,8 +214,8 @@ def compared(
     return tuple(row(target, before.interval(target), after.interval(target)) for target in wanted)
 
 
-def svg(title: str, rows: Sequence[IntervalRow]) -> str:
-    """Intervals before and after as a picture, relative to the value after; those that reach 0 are left out.
+def _intervals(title: str, rows: Sequence[IntervalRow]) -> Figure:
+    """Intervals before and after, relative to the value after; those that reach 0 are left out.
 
     Parameters
     ----------
@@ -234,8 +235,12 @@ def svg(title: str, rows: Sequence[IntervalRow]) -> str:
         Curve("points", "after", ones, names, after[0], after[1], colour=BLUE),
     )
     panel = Panel(curves, Axis("times the value after, 95 % intervals", log=True), Axis(names=tuple(names)))
-    figure = Figure("intervals", title, title, {"": (panel,)})
-    return next(content for name, content in files(figure) if name.endswith(".svg")).decode()
+    return Figure("intervals", title, title, {"": (panel,)})
+
+
+def svg(title: str, rows: Sequence[IntervalRow]) -> str:
+    """The intervals as a picture."""
+    return next(content for name, content in files(_intervals(title, rows)) if name.endswith(".svg")).decode()
 
 
 def _label(row: IntervalRow) -> str:
@@ -246,7 +251,7 @@ def _label(row: IntervalRow) -> str:
 
 
 @dataclass(frozen=True)
-class Planned:
+class Planned(display.Displayed):
     """A plate of coupons.
 
     Attributes
@@ -283,6 +288,11 @@ class Planned:
         yield f"{self.folder}: {len(self.files)} files; print {self.name}.prusa.3mf (.cura, .orca) as plate.svg shows,"
         yield f"measure, fill in {FORM}, then:"
         yield f"sensorgen characterise read {self.folder / FORM}"
+
+
+@display.figure.register(Planned)
+def _(of: Planned) -> Any:
+    return whole(_intervals(of.name, of.rows))
 
 
 def plan(

@@ -11,7 +11,7 @@ from typing import Any
 
 from sensorgen.analysis.plots import pages
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, PINK, Axis, Curve, Figure, Panel
-from sensorgen.core import document
+from sensorgen.core import display, document
 from sensorgen.core import files as store
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import SensorgenError, Unprintable, within
@@ -77,10 +77,15 @@ def optimise(
     return answer
 
 
-def page(result: Optimised) -> str:
-    """A self-contained page; raises MissingValue where Plotly is not installed."""
+def _axes(result: Optimised) -> tuple[str, str]:
+    """Names of the two numbers."""
     names = list(dict.fromkeys([*result.objectives, *(n for c in result.front for n in c.numbers)]))
-    across, up = names[0], names[min(1, len(names) - 1)]
+    return names[0], names[min(1, len(names) - 1)]
+
+
+def _front(result: Optimised) -> tuple[Figure, ...]:
+    """Evaluated designs by two numbers, the objectives where there are two; nothing where none has both."""
+    across, up = _axes(result)
     curves = tuple(
         _points(name, _COLOURS[name], shown, across, up)
         for name, some in _groups(result).items() if (shown := _known(some, across, up))
@@ -88,14 +93,22 @@ def page(result: Optimised) -> str:
     x, y = (NUMBERS[key].words for key in (across, up))
     axes = [Axis(f"{NUMBERS[key].words} [{NUMBERS[key].unit}]", log=True) for key in (across, up)]
     alt = f"Evaluated designs by {x} and {y}, with what the models leave open of {x}."
-    figures = (
-        (Figure("front", f"{x.capitalize()} and {y} as printed", alt, {"": (Panel(curves, axes[0], axes[1]),)}),)
-        if curves
-        else ()
-    )
-    blind = sum(not (c.senses(across) and c.senses(up)) for c in result.designs)
+    title = f"{x.capitalize()} and {y} as printed"
+    return (Figure("front", title, alt, {"": (Panel(curves, axes[0], axes[1]),)}),) if curves else ()
+
+
+@display.figure.register(Optimised)
+def _(of: Optimised) -> Any:
+    from sensorgen.analysis.plots import static
+
+    return static.first(of, _front(of))
+
+
+def page(result: Optimised) -> str:
+    """A self-contained page; raises MissingValue where Plotly is not installed."""
+    blind = sum(not all(map(c.senses, _axes(result))) for c in result.designs)
     words = [f"{blind} designs that cannot sense force or cannot locate are in the table alone"] * (blind > 0)
-    section = pages.PageSection("", "", figures, tuple(result.document()))
+    section = pages.PageSection("", "", _front(result), tuple(result.document()))
     return pages.page(f"Best designs: {result.name}", words, [section])
 
 
