@@ -56,11 +56,7 @@ def rounded():
         part = plate(0, 0, z, 30, 10, high)
         return cad.fillet(part.edges().filter_by(cad.Axis.Z), 1.0)
 
-    return {
-        "low": (layer(0, 0.4), "#303436"),
-        "pad": (layer(0.4, 0.6), "#f2c14e"),
-        "up": (layer(1.0, 0.4), "#303436"),
-    }
+    return {"low": (layer(0, 0.4), "#303436"), "pad": (layer(0.4, 0.6), "#f2c14e"), "up": (layer(1.0, 0.4), "#303436")}
 
 
 def serpentine(z):
@@ -97,4 +93,3 @@ if __name__ == "__main__":
     write(out, "crossed", crossed())
     write(out, "rounded", rounded())
     write(out, "colliding", colliding())
-    write(out, "inches", filleted(), "inch")

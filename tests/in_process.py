@@ -3,8 +3,42 @@
 import contextlib
 import io
 import sys
+from dataclasses import dataclass
+
+import pytest
 
 from sensorgen.cli import main
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a command left behind: exit code, and what it wrote where."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def words(self):
+        """The output without its line breaks and columns."""
+        return " ".join(self.out.split())
+
+    @property
+    def line(self) -> str:
+        """The one line on stderr; anything else there is a fault."""
+        assert self.err.count("\n") == 1, self.err
+        assert self.err.startswith("sensorgen: "), self.err
+        assert "Traceback" not in self.out + self.err
+        return self.err.strip()
+
+
+def captured(capfd, monkeypatch, *words) -> Said:
+    """What a command left behind, by the descriptors: of libraries and of processes that it started, too."""
+    monkeypatch.setattr(sys, "argv", ["sensorgen", *map(str, words)])
+    capfd.readouterr()
+    with pytest.raises(SystemExit) as left:
+        main()
+    return Said(left.value.code, *capfd.readouterr())
 
 
 def run(folder, *words):

@@ -1,7 +1,5 @@
 """Changes that are tried: the nearest that removes findings, checked again by hand, and written into the file."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from math import log
 from pathlib import Path
@@ -86,13 +84,6 @@ def test_advice_is_stored_and_read_again(plate, shared_cache, monkeypatch):
     assert advised(design, made, 0.0) == first
 
 
-def test_a_budget_that_is_used_up_is_stated(plate):
-    design, made, _ = plate
-    advice = advise(design, made, 1e-9)
-    assert not advice.complete
-    assert "ended by the budget" in list(advice.document())[-1]
-
-
 def test_many_heights_go_to_the_grid_at_once(shared_cache, monkeypatch):
     """Before single steps, of which there may be more than are tried: one alone leaves the findings of the other."""
     size = {"length_mm": 6.0, "electrode_mm": 0.45, "dielectric_mm": 0.25, "height_mm": 0.35}
@@ -141,24 +132,6 @@ def test_a_change_that_is_not_needed_is_dropped(plate):
     idle = {("parameters", "length_mm"): 27.0, ("parameters", "width_mm"): 9.0}
     search.run(search.changed(idle | {("parameters", "dielectric_mm"): 0.6}))
     assert [one.values for one in search.nearest] == [{("parameters", "dielectric_mm"): 0.6}]
-
-
-BURN = "import time\nwhile time.process_time() < 0.2: pass"
-
-
-def test_the_time_of_slicers_counts(plate, monkeypatch):
-    """Each review takes 0.2 s of another program, and hardly any of this one."""
-    design, made, _ = plate
-
-    def by_another(search, one):
-        subprocess.run([sys.executable, "-I", "-S", "-c", BURN], check=True)
-        search.checked += 1
-        return list(made.findings)
-
-    monkeypatch.setattr(AdviceSearch, "_reviewed", by_another)
-    advice = advise(design, made, 0.5)
-    assert 1 <= advice.checked <= 3
-    assert 0.5 <= advice.seconds < 1.0
 
 
 def test_a_prediction_that_would_outrun_the_budget_is_not_begun(plate):
@@ -236,17 +209,11 @@ def test_what_a_change_does_to_the_sensor_is_said(plate, changed, better, words)
     assert effects(numbers(made), numbers(made, **changed)) == (better, words)
 
 
-def test_a_gain_is_no_loss(plate):
-    _, made, _ = plate
-    assert effects(numbers(made, position_resolution=0.05), numbers(made)) == (True, "position resolution gained")
-
-
 def test_what_improves_the_sensor_is_first_and_losses_are_in_its_line(plate, monkeypatch):
     """Planted: the whole layer makes force three times worse; a known plate, further away, makes it twice as good."""
     design, made, _ = plate
-    known = best.KnownDesign(
-        about="best known plate", numbers="0.2 N", seconds=1.0, quality="extrafine", parameters={"dielectric_mm": 0.3}
-    )
+    own = {"quality": "extrafine", "parameters": {"dielectric_mm": 0.3}}
+    known = best.KnownDesign(about="best known plate", numbers="0.2 N", seconds=1.0, **own)
 
     def planted(one, **_):
         good = one.params.dielectric_mm == 0.3

@@ -72,37 +72,30 @@ def test_a_grid_as_coarse_as_a_reading_tells_has_the_quantiles_of_the_density(st
 def test_intervals_of_a_known_sensor_hold_nine_tenths_of_the_presses_that_were_expected(model):
     """Presses drawn from the prior of force and position, readings with their noise alone: 90 %, not 92 %."""
     noise, rng = np.full(len(TONES_HZ), 1e-3), np.random.default_rng(5)
-    known = prior(model, noise)
-    known = replace(
-        known, covariance=1e-10 * known.covariance, scatter=1e-7, wander_c=1e-8, wander_r=1e-8,
-        unloading=(0.0, 1e-6), decades=(0.0, 1e-6),
-    )  # fmt: skip
+    known, none = prior(model, noise), (0.0, 1e-6)
+    known = replace(known, scatter=1e-7, wander_c=1e-8, wander_r=1e-8, unloading=none, decades=none)
+    known = replace(known, covariance=1e-10 * known.covariance)
     presses = unknown(rng.uniform(0, LIMIT_N, 8000), rng.uniform(0, model.sensor.length_m, 8000))
     white = rng.standard_normal((2, 8000, len(TONES_HZ)))
-    found = Inverter(model, known, force_limit_n=LIMIT_N).batch(
-        model.ratio(known.at, presses) + noise * (white[0] + 1j * white[1])
-    )
+    ratio = model.ratio(known.at, presses) + noise * (white[0] + 1j * white[1])
+    found = Inverter(model, known, force_limit_n=LIMIT_N).batch(ratio)
     covered = [mask.mean() for mask in inside(found, presses)]
     assert covered == pytest.approx([0.9, 0.9], abs=0.01)  # three standard deviations
 
 
 @pytest.mark.parametrize(
     "error",
-    [
-        pytest.param("C +1 %", marks=pytest.mark.nightly),
-        pytest.param("stray 1 pF", marks=pytest.mark.nightly),
-        "gain 0.3 %, 20 ohm, 0.3 pF, E -5 %",
-    ],
-)
+    [*(pytest.param(one, marks=pytest.mark.nightly) for one in ("C +1 %", "stray 1 pF")),
+     "gain 0.3 %, 20 ohm, 0.3 pF, E -5 %"],
+)  # fmt: skip
 def test_an_error_of_the_model_no_longer_misleads(model, error):
     truth = ERRORS[error](1)
     known, others = split(truth, 30, 200, 1)
     known, unseen = data(known, truth), data(others, truth)
     exact = Estimator(model.sensor, TONES_HZ, truth.noise, force_limit_n=LIMIT_N).batch(others.pressed_ohm)
     assert inside(exact, unseen.presses)[0].mean() < 0.8  # the planted error, seen without calibration
-    found = coverage_of(
-        Inverter(model, calibrated(model, known), force_limit_n=LIMIT_N).batch(unseen.ratio), unseen.presses
-    )
+    inverter = Inverter(model, calibrated(model, known), force_limit_n=LIMIT_N)
+    found = coverage_of(inverter.batch(unseen.ratio), unseen.presses)
     assert found.force >= 0.85 * found.presses
     assert found.position >= 0.85 * found.presses
 

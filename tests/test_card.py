@@ -3,8 +3,6 @@
 import itertools
 import json
 import math
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -60,9 +58,8 @@ def tri(rho=0.135) -> Sensor:
 
 def table_c1() -> Sensor:
     """Table C.1: 178 x 8.4 mm, h 0.6 mm, eps 6.33, E 1 MPa, 0.07 and 0.2 ohm m."""
-    return Sensor(
-        0.178, 0.0084, (3e-4, 3e-4), (0.07, 0.2), EPS0 * 6.33 * 0.0084 / 6e-4, compression.unconfined(1e6)
-    )  # fmt: skip
+    law = compression.unconfined(1e6)
+    return Sensor(0.178, 0.0084, (3e-4, 3e-4), (0.07, 0.2), EPS0 * 6.33 * 0.0084 / 6e-4, law)
 
 
 def setup(sensor: Sensor, tones=TONES_HZ, noise=1e-3, force=6.0, place=0.05) -> Setup:
@@ -219,11 +216,9 @@ def test_shares_are_what_a_tone_adds():
         fainter = np.ones(len(TONES_HZ))
         fainter[k] = math.sqrt(1 - less)  # that tone with the information 1 - less
         dimmed = bounds(Slopes(*(slope * fainter for slope in found)), 1e-3)
-        for share, before, after in (
-            (of_force, whole.force_n, dimmed.force_n),
-            (of_position, whole.position_m, dimmed.position_m),
-        ):
-            assert (1 - (before / after) ** 2) / less == pytest.approx(share[k], rel=1e-3, abs=1e-4)
+        for share, name in ((of_force, "force_n"), (of_position, "position_m")):
+            kept = (getattr(whole, name) / getattr(dimmed, name)) ** 2
+            assert (1 - kept) / less == pytest.approx(share[k], rel=1e-3, abs=1e-4)
 
 
 # ---- what has to hold whatever the numbers ----
@@ -232,11 +227,6 @@ def test_shares_are_what_a_tone_adds():
 def test_errors_are_proportional_to_noise():
     one, ten = (sigmas(tri(), noise=noise) for noise in (1e-4, 1e-3))
     assert ten == pytest.approx(tuple(10 * s for s in one), rel=1e-12)
-
-
-def test_tones_may_come_in_any_order():
-    there, back = (sigmas(tri(), tones) for tones in (TONES_HZ, TONES_HZ[::-1]))
-    assert there == pytest.approx(back, rel=1e-9)
 
 
 def test_reading_every_tone_twice_is_worth_a_root_of_two():
@@ -338,13 +328,6 @@ def test_slopes_per_tone_are_those_of_the_sensor():
         assert row.relative_by_position_per_m.im == pytest.approx(moved.imag / 1e-5, rel=1e-3)
 
 
-def test_press_is_stated():
-    press = identify(plate(), TONES_HZ).press
-    assert vars(press) == pytest.approx(
-        {"force_n": 6.0, "position_m": 0.05, "tip_m": 0.01, "stress_pa": 6e4, "strain": 0.01}
-    )
-
-
 def test_the_map_holds_the_bounds():
     sensor = tri()
     found = identify(sensor, TONES_HZ).map
@@ -442,16 +425,6 @@ def plain(found: Identifiability):
     assert kind.validate_json(text) == found
 
 
-def test_it_goes_to_json_and_back():
-    plain(identify(plate(), TONES_HZ, stiffest=bonded()))
-
-
-def test_it_needs_neither_scipy_nor_matplotlib():
-    program = "import sys, sensorgen.prediction.identifiability; print({'scipy', 'matplotlib'} & set(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, encoding="utf-8", check=True)
-    assert done.stdout.strip() == "set()"
-
-
 # ---- verdicts ----
 
 NEED = Required(0.6, 0.01, 6 / math.sqrt(12), 0.1 / math.sqrt(12))
@@ -542,15 +515,10 @@ def test_the_table_of_the_documents():
 OLD = json.loads((Path(__file__).parent / "reference" / "identifiability_schema_1.json").read_text("utf-8"))
 
 
-@pytest.mark.parametrize(
-    ("name", "sensor"),
-    [
-        ("plate", replace(plate(), resistivity_ohm_m=(0.07, 0.2))),
-        ("capacitor", replace(plate(), resistivity_ohm_m=(0.0, 0.0))),
-    ],
-)
-def test_predictions_of_version_0_1_0_still_read(name, sensor):
+@pytest.mark.parametrize(("name", "rho"), [("plate", (0.07, 0.2)), ("capacitor", (0.0, 0.0))])
+def test_predictions_of_version_0_1_0_still_read(name, rho):
     """Numbers that another version stored, and what this one finds."""
+    sensor = replace(plate(), resistivity_ohm_m=rho)
     old, new = of_schema_1(OLD[name]), identify(sensor, TONES_HZ, stiffest=None if name == "capacitor" else bonded())
     numbers = ("sigma_force_n", "sigma_position_m", "correlation", "corner_frequency_hz")
     for key in numbers:

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from line_cases import exact as exact_line
@@ -19,7 +20,7 @@ from test_stack import exact as exact_stack
 
 from sensorgen import models
 from sensorgen.core.bounds import Interval
-from sensorgen.core.errors import SensorgenError
+from sensorgen.core.errors import SensorgenError, UnknownName
 from sensorgen.models import fem3d
 from sensorgen.verification import chart
 from sensorgen.verification.chart import cells, elastic, lines, networks, presses
@@ -27,6 +28,7 @@ from sensorgen.verification.chart import measured as measured_in
 from sensorgen.verification.chart import plot as pictures
 from sensorgen.verification.chart.cells import STANDARD
 from sensorgen.verification.chart.measured import ChartPoint, with_front
+from sensorgen.verification.chart_command import command
 
 REFERENCE = Path(__file__).parent / "reference"
 
@@ -57,36 +59,6 @@ def test_the_front_is_what_nothing_beats(pairs):
     assert front == {q for q in pairs if not any(r[0] <= q[0] and r[1] <= q[1] and r != q for r in pairs)}
 
 
-@pytest.mark.parametrize(
-    ("runs", "counts", "expected"),
-    [
-        ([0.5, 0.01], 2, 0.01),  # the first one imported something
-        ([2.0], 1, 2.0),
-        ([0.01, 0.03, 0.02, 0.05, 0.04], 5, 0.03),
-        ([0.1, 0.15, 0.12], 3, 0.12),
-    ],
-)
-def test_quick_work_is_timed_several_times(monkeypatch, runs, counts, expected):
-    monkeypatch.setattr(measured_in, "_REPEATS", 5)
-    clock = iter(np.cumsum([0.0, *[x for run in runs for x in (run, 0.0)]]).tolist())
-    monkeypatch.setattr(measured_in, "used_s", lambda: next(clock))
-    called = []
-    _, seconds = measured_in.timed(lambda: called.append(1))
-    assert len(called) == counts
-    assert seconds == pytest.approx(expected)
-
-
-def test_errors_are_of_the_bound_that_is_further_off():
-    def error(name, low, high):
-        standard = STANDARD[name]()
-        exact = standard.capacitance_f_per_m2
-        return cells.point("s", "m", Interval(low * exact, high * exact), standard, 1.0).error
-
-    assert error("plate, 0.6 mm", 0.9, 1.05) == pytest.approx(0.1)
-    assert error("plate, 0.6 mm", 0.9, 1.2) == pytest.approx(0.2)
-    assert error("rect, 0.1 mm", 1.0, 1.0) == 2.7e-5
-
-
 def test_every_cell_of_the_reference_is_there():
     known = json.loads((REFERENCE / "cells.json").read_text("utf-8"))
     for case in known["tri"]:
@@ -106,10 +78,8 @@ def test_presses_are_those_of_the_reference(film):
     known, ours = json.loads((REFERENCE / "contact.json").read_text("utf-8")), presses.CELLS[film]
     theirs = known[f"tri_d{film.removesuffix(' mm')}"]
     at = [theirs["p_kPa"].index(kpa) for kpa in ours.stress_kpa]
-    for mine, key, error, floor in (
-        (ours.down_um, "uy_um", "uy_err_um", ours.known_to[0]),
-        (ours.rise_pf_per_m, "dC_pF_per_m", "dC_err", ours.known_to[1]),
-    ):
+    down, rise = (ours.down_um, "uy_um", "uy_err_um"), (ours.rise_pf_per_m, "dC_pF_per_m", "dC_err")
+    for (mine, key, error), floor in zip((down, rise), ours.known_to, strict=True):
         assert list(mine) == [theirs[key][k] for k in at]
         assert max(theirs[error][k] / theirs[key][k] for k in at) <= floor
     assert ours.rest_pf_per_m == theirs["C0_exact_pF_per_m"]
@@ -140,49 +110,6 @@ def test_textbook_scenes_are_met():
         assert errors[0] / errors[1] > 6
 
 
-def widths(work, seconds=lambda _: 1e-6, width=1e-3):
-    """Widths that a model is asked for, and those that it gives bounds for."""
-    asked, standard = [], SimpleNamespace(scene=None, permittivity=None)
-
-    def capacitance(scene, permittivity, *wanted):
-        asked.extend(wanted)
-        return work(*wanted)
-
-    model = SimpleNamespace(WIDTH=width, capacitance=capacitance)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(measured_in, "timed", lambda work: (work(), seconds(asked)))
-        return asked, [wanted for wanted, _, _ in measured_in.climb(cells._widths(model, standard), 1.0)]
-
-
-def around_one(wanted):
-    return Interval(1 - wanted / 4, 1 + wanted / 4)
-
-
-def test_widths_go_on_until_it_costs_too_much():
-    asked, given = widths(around_one, lambda asked: 10.0 ** len(asked) / 1e4)
-    assert asked == pytest.approx([0.1, 1e-2, 1e-3, 1e-4])  # the last took 1 s: ten times that is over the budget
-    assert given == asked
-
-
-def test_widths_end_where_nothing_is_gained():
-    for low, high in ((0.9, 1.1), (1.0, 1.0)):
-        assert widths(lambda _, ends=(low, high): Interval(*ends))[1] == [0.1]
-    asked, given = widths(lambda _: Interval(0.97, 1.03))
-    assert (asked, given) == ([0.1, 0.01], [0.1])  # the second is no narrower
-    assert widths(lambda: Interval(0.9, 1.1), width=math.inf) == ([], [None])
-
-
-def test_widths_go_on_where_the_first_one_fails():
-    def work(wanted):
-        if wanted > 0.05 or wanted < 5e-3:
-            raise SensorgenError("the solver failed")
-        return around_one(wanted)
-
-    asked, given = widths(work)
-    assert asked == pytest.approx([0.1, 1e-2, 1e-3])
-    assert given == pytest.approx([1e-2])
-
-
 @pytest.fixture(scope="module")
 def measured():
     said = []
@@ -192,16 +119,6 @@ def measured():
         found = chart.points(["tri, 0.2 mm", "plate, 0.6 mm"], 1e9, said.append)
     assert said == ["tri, 0.2 mm", "plate, 0.6 mm"]
     return found
-
-
-def test_every_model_that_can_speak_is_there(measured):
-    models = {(p.scene, p.model) for p in measured}
-    assert {
-        ("tri, 0.2 mm", m) for m in ("columns", "fem2d", "thesis_cells: 3.35", "thesis_cells: 3.34-printed")
-    } <= models
-    assert {("plate, 0.6 mm", m) for m in ("columns", "fem2d", "fem3d")} <= models
-    assert ("tri, 0.2 mm", "fem3d") not in models
-    assert all(p.seconds > 0 for p in measured)
 
 
 def test_what_is_known_of_errors(measured):
@@ -217,6 +134,32 @@ def test_what_is_known_of_errors(measured):
     assert off["thesis_cells: 3.35"] == pytest.approx(0.2417, abs=2e-4)
     assert off["thesis_cells: 3.34-printed"] > 1
     assert min(p.error for p in measured if p.model == "fem2d" and p.scene.startswith("tri")) < 1e-5
+
+
+def widths(work, width=1e-3):
+    """Widths that a model is asked for, and those that it gives bounds for."""
+    asked, standard = [], SimpleNamespace(scene=None, permittivity=None)
+
+    def capacitance(*given):
+        asked.append(given[2:])
+        return work(*given[2:])
+
+    steps = cells._widths(SimpleNamespace(WIDTH=width, capacitance=capacitance), standard)
+    return asked, [wanted for wanted, bounds in steps if bounds()]
+
+
+def test_widths_go_on_where_the_first_one_fails_and_end_where_nothing_is_gained():
+    def failing(wanted):
+        if wanted > 0.05 or wanted < 5e-3:
+            raise SensorgenError("the solver failed")
+        return Interval(1 - wanted / 4, 1 + wanted / 4)
+
+    asked, given = widths(failing)
+    assert np.ravel(asked) == pytest.approx([0.1, 1e-2, 1e-3])
+    assert given == pytest.approx([1e-2])
+    assert widths(lambda _: Interval(1.0, 1.0)) == ([(0.1,)], [0.1])
+    assert widths(lambda _: Interval(0.97, 1.03)) == ([(0.1,), (0.01,)], [0.1])  # the second is no narrower
+    assert widths(lambda: Interval(0.9, 1.1), width=math.inf) == ([()], [None])
 
 
 FLAT = [name for name, standard in lines.STANDARD.items() if standard.profile == "uniform"]
@@ -238,9 +181,8 @@ def test_the_line_under_a_round_tip_is_known():
 
     p = vars(lines.STANDARD[ROUND].line())
     tip, right = p["tip_m"], p["length_m"] - p["left_m"] - p["tip_m"]
-    r = (
-        p["top_resistivity_ohm_m"] / p["top_thickness_m"] + p["bottom_resistivity_ohm_m"] / p["bottom_thickness_m"]
-    ) / p["width_m"]
+    ends = (p[f"{end}_resistivity_ohm_m"] / p[f"{end}_thickness_m"] for end in ("top", "bottom"))
+    r = sum(ends) / p["width_m"]
     strain = 4 / np.pi * p["force_n"] / (p["width_m"] * tip * p["modulus_pa"])
     for tone, known in lines.STANDARD[ROUND].known.items():
         y = 2j * np.pi * tone * 8.8541878128e-12 * p["eps_r"] * p["width_m"] / p["film_m"]
@@ -402,9 +344,8 @@ def test_networks():
     assert all(p.error < most for p, most in zip(steps, (1e-6, 1e-8, 1e-12, 1e-12), strict=True))
     across, _ = by_model("printed lines across the current")
     assert across["traxels"].error < 1e-9
-    assert across["traxels: as a solid"].error == pytest.approx(
-        1 - 1 / (1 + 11 / 12 * 1e-2 / (0.2 * 0.42e-3)), rel=1e-9
-    )
+    as_a_solid = 1 - 1 / (1 + 11 / 12 * 1e-2 / (0.2 * 0.42e-3))
+    assert across["traxels: as a solid"].error == pytest.approx(as_a_solid, rel=1e-9)
 
 
 def test_a_printed_electrode_is_that_of_the_reference():
@@ -419,31 +360,14 @@ def test_a_printed_electrode_is_that_of_the_reference():
 def test_every_model_is_on_the_chart():
     """A scene of each question, the dear ones measured as little as can be; whoever is silent there says why."""
     names = [
-        "tri, 0.1 mm",
-        "rect, 0.2 mm",
-        "tri pressed, 0.1 mm: rise of C",
-        "block, free all round",
-        "inversion of a load",
-    ]
-    names += [
-        "cylinder on a flat",
-        "sphere on a flat",
-        "line, seven tones",
-        ROUND,
-        "electrode, steps across the current",
-    ]
-    names += ["printed lines across the current"]
+        "tri, 0.1 mm", "rect, 0.2 mm", "tri pressed, 0.1 mm: rise of C", "block, free all round", "inversion of a load",
+        "cylinder on a flat", "sphere on a flat", "line, seven tones", ROUND, "electrode, steps across the current",
+        "printed lines across the current",
+    ]  # fmt: skip
     found = chart.points(names, 0.0, lambda _: None)
     spoke = {p.model.partition(":")[0] for p in found}
     missing = set() if presses.has_mesher() else {"press2d", "press_round"}
-    missing |= {
-        "closed",
-        "coupons",
-        "curved",
-        "overlap",
-        "porous",
-        "sandwich",
-    }  # measured by benches and tests of their own
+    missing |= {"closed", "coupons", "curved", "overlap", "porous", "sandwich"}  # have benches and tests of their own
     assert set(models.names()) - spoke == missing
     said = {(s.scene, s.model): s.why for s in chart.silent(names, found)}
     both = {(p.scene, p.model.partition(":")[0]) for p in found} | set(said)
@@ -467,9 +391,8 @@ def test_every_scene_has_a_question_and_reasons(name):
 def test_what_is_known_of_presses(monkeypatch):
     """Cheap laws are off by what docs/compression.md and docs/cells.md say; a budget ends the meshes."""
     monkeypatch.setattr(presses, "_levels", lambda *_: [])
-    down, rise = (
-        {p.model: p for p in presses.points(f"tri pressed, 0.1 mm: {w}", 1.0)} for w in ("top down", "rise of C")
-    )
+    asked = (presses.points(f"tri pressed, 0.1 mm: {what}", 1.0) for what in ("top down", "rise of C"))
+    down, rise = ({p.model: p for p in points} for points in asked)
     assert down["compression: unconfined"].error == pytest.approx(1 - 0.6e-3 * 1e4 / 6e6 / 6.1323e-6, abs=1e-4)
     assert down["compression: bonded"].error > 0.99
     assert down["springs"].error > 1
@@ -478,69 +401,29 @@ def test_what_is_known_of_presses(monkeypatch):
     assert "off by -" in rise["thesis_cells: 3.1.2, field"].result
 
 
-def test_the_worst_load_of_a_press_counts():
-    error, words = measured_in.relative((1.0, 2.0, 3.0), 1e-3)(np.array([1.0, 2.6, 3.3]))
-    assert error == pytest.approx(0.3)
-    assert words == "off by +0.3 at most"
-
-
-def test_without_the_mesher_cheap_laws_are_left(monkeypatch):
-    monkeypatch.setattr(presses.mesher, "find_spec", lambda _: None)
-    found = {
-        name: {p.model for p in presses.points(f"tri pressed, 0.2 mm: {name}", 1.0)}
-        for name in ("top down", "rise of C")
-    }
-    plates = {"compression: unconfined", "compression: bonded"}
-    assert found == {
-        "top down": plates | {"springs"},
-        "rise of C": plates | {"thesis_cells: 3.1.2, formula 3.35", "thesis_cells: 3.1.2, field"},
-    }
-
-
+@pytest.mark.skipif(not presses.has_mesher(), reason="needs NGSolve")
 def test_meshes_of_presses_come_nearer_until_it_costs_too_much(monkeypatch):
-    asked = []
+    asked, down_um = [], np.array([0, *presses.CELLS["0.1 mm"].down_um])
 
     def work(cell, solids, stress, permittivity, fineness):
         asked.append(fineness.apex_mm)
-        return SimpleNamespace(
-            converged_pa=stress[-1], displacement_m=np.array([0, *presses.CELLS["0.1 mm"].down_um]) * 1.01e-6
-        )
+        return SimpleNamespace(converged_pa=stress[-1], displacement_m=down_um * 1.01e-6)
 
     monkeypatch.setattr(presses.press2d, "press", work)
     monkeypatch.setattr(measured_in, "timed", lambda work: (work(), 1.0))
     found = [p for p in presses.points("tri pressed, 0.1 mm: top down", 5.0) if p.model == "press2d"]
-    assert (len(found), len(asked)) == (1, 1)
-    assert found[0].error == pytest.approx(0.01)
+    assert [p.error for p in found] == [pytest.approx(0.01)]
     asked.clear()
     presses.points("tri pressed, 0.1 mm: top down", 50.0)
-    assert asked == sorted(asked, reverse=True)
-    assert len(asked) == 3
+    assert (len(asked), asked) == (3, sorted(asked, reverse=True))
 
 
-def test_a_budget_ends_the_ladders(monkeypatch):
-    monkeypatch.setattr(measured_in, "timed", lambda work: (work(), 1.0))
-    found = [p for p in lines.points("line, seven tones", 5.0) if p.model == "sheet"]
-    assert len(found) == 1
-
-
-def test_no_two_models_look_alike():
-    assert len({tuple(pictures.look(k).values()) for k in range(30)}) == 30
-    for scene in chart.SCENES:
-        alike = [point(1.0, 1.0, scene=scene), SimpleNamespace(scene=scene, model="n", bounded=False)]
-        assert pictures.looks(scene, alike) == {"m": 0, "n": 1}
-
-
-def test_the_picture(measured):
-    image = pictures.png(measured)
-    assert image[:8] == b"\x89PNG\r\n\x1a\n"
-    assert len(set(image)) > 100
-    few = measured[:3]
-    assert pictures.png(few) == pictures.png(few)
-
-
-def test_the_front_is_drawn_as_a_staircase():
-    steps = list(pictures.steps([point(1.0, 0.5), point(2.0, 0.1), point(4.0, 0.01)]))
-    assert steps == [(1.0, 0.5), (2.0, 0.5), (2.0, 0.1), (4.0, 0.1), (4.0, 0.01)]
+def test_without_the_mesher_cheap_laws_are_left(monkeypatch):
+    monkeypatch.setattr(presses.mesher, "find_spec", lambda _: None)
+    plates, thesis = {"compression: unconfined", "compression: bonded"}, "thesis_cells: 3.1.2"
+    expected = {"top down": {"springs"}, "rise of C": {f"{thesis}, formula 3.35", f"{thesis}, field"}}
+    for name, others in expected.items():
+        assert {p.model for p in presses.points(f"tri pressed, 0.2 mm: {name}", 1.0)} == plates | others
 
 
 def test_the_page_in_a_browser(measured, tmp_path, browser):
@@ -552,10 +435,6 @@ def test_the_page_in_a_browser(measured, tmp_path, browser):
 
 
 def test_the_command(tmp_path):
-    from click.testing import CliRunner
-
-    from sensorgen.verification.chart_command import command
-
     out = tmp_path / "new" / "chart"
     words = ["--scene", "plate, 0.6 mm", "--budget", "0.1", "-o", str(out)]
     done = CliRunner().invoke(command, words)
@@ -572,8 +451,5 @@ def test_the_command(tmp_path):
 
 
 def test_the_command_refuses_other_scenes():
-    from sensorgen.core.errors import UnknownName
-    from sensorgen.verification.chart_command import command
-
     with pytest.raises(UnknownName, match=r"standard scene 'tri, 0.3 mm'; did you mean 'tri, 0.2 mm'|'tri, 0.1 mm'"):
         command.main(["--scene", "tri, 0.3 mm"], standalone_mode=False)

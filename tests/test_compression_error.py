@@ -36,15 +36,10 @@ def estimated(level=0, loads=LOADS, of=None):
 
 def holds(found):
     """Whether the stated intervals meet those of the other program, of displacement and rise at each load."""
-    values = (
-        (found.found.displacement_m * 1e6, found.displacement_error_m * 1e6, KNOWN["uy_um"]),
-        (found.rise_f_per_m2 * PER_M, found.rise_error_f_per_m2 * PER_M, KNOWN["dC_pF_per_m"]),
-    )
-    return [
-        value - off <= max(known) and min(known) <= value + off
-        for middle, error, others in values
-        for value, off, known in zip(middle[1:], error[1:], others, strict=True)
-    ]
+    down = (found.found.displacement_m * 1e6, found.displacement_error_m * 1e6, KNOWN["uy_um"])
+    rise = (found.rise_f_per_m2 * PER_M, found.rise_error_f_per_m2 * PER_M, KNOWN["dC_pF_per_m"])
+    each = [row for middle, error, others in (down, rise) for row in zip(middle[1:], error[1:], others, strict=True)]
+    return [value - off <= max(known) and min(known) <= value + off for value, off, known in each]
 
 
 @pytest.mark.parametrize("level", [-1, 0, pytest.param(2, marks=pytest.mark.nightly)])

@@ -65,10 +65,8 @@ def test_slanted_prisms_touch_at_their_apex():
 
 
 def layers(*plans):
-    return [
-        LayerRegions(0.1 * k, 0.1 * (k + 1), {name: shapely.box(*corners) for name, *corners in plan})
-        for k, plan in enumerate(plans)
-    ]
+    regions = [{name: shapely.box(*corners) for name, *corners in plan} for plan in plans]
+    return [LayerRegions(0.1 * k, 0.1 * (k + 1), each) for k, each in enumerate(regions)]
 
 
 BODIES = (LOW, FILM, HIGH)

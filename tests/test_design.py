@@ -7,8 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
-from sensorgen.core.findings import Finding
+from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.design import design, printer
 from sensorgen.design.design import make, name_of
 from sensorgen.design.shapes import reference
@@ -20,28 +19,12 @@ def tri(**more):
 
 
 CHANGES = [
-    {"parameters": {"period_mm": 2.5}},
-    {"parameters": {"dielectric_mm": 0.2000001}},
-    {"parameters": {"along": "y"}},
-    {"parameters": {"isolation_mm": 0.1}},
-    {"materials": {"film": "x60@thesis-4.1"}},
-    {"materials": {"top_electrode": "etpu@thesis-3.2"}},
-    {"materials": {"support": "bvoh"}},
-    {"printer": "prusa-xl5"},
-    {"quality": "extrafine"},
-    {"nozzle_mm": 0.25},
-    {"tools": {"x60": 2}},
-    {"infill": {"x60": {"percent": 80}}},
-    {"infill": {"x60": {"pattern": "grid"}}},
-    {"orientation": "upside-down"},
-    {"shrinkage": 0.02},
-]
-
-
-@pytest.mark.parametrize("change", CHANGES, ids=str)
-def test_everything_that_decides_the_sensor_changes_its_id_and_its_name(change):
-    assert tri(**change).id() != tri().id()
-    assert tri(**change).name != tri().name
+    {"parameters": {"period_mm": 2.5}}, {"parameters": {"dielectric_mm": 0.2000001}}, {"parameters": {"along": "y"}},
+    {"parameters": {"isolation_mm": 0.1}}, {"materials": {"film": "x60@thesis-4.1"}},
+    {"materials": {"top_electrode": "etpu@thesis-3.2"}}, {"materials": {"support": "bvoh"}}, {"printer": "prusa-xl5"},
+    {"quality": "extrafine"}, {"nozzle_mm": 0.25}, {"tools": {"x60": 2}}, {"infill": {"x60": {"percent": 80}}},
+    {"infill": {"x60": {"pattern": "grid"}}}, {"orientation": "upside-down"}, {"shrinkage": 0.02},
+]  # fmt: skip
 
 
 def test_ids_and_names_of_all_changes_differ():
@@ -117,26 +100,13 @@ def test_names_made_from_odd_file_names_are_safe(tmp_path, stem):
 
 
 BAD = [
-    ({}, BadInput, "shape is missing; expected bump, cog, cone, double"),
     ({"shape": 3}, BadInput, "shape is 3; expected text"),
     ({"shape": "tri", 1: 2}, BadInput, "1 is 1; expected"),
-    ({"shape": "tri", "parameters": {"period_mm": True}}, BadInput, "period_mm is True; expected a number"),
     ({"shape": "tri", "parameters": {"period_mm": 10**400}}, BadInput, "expected a number"),
     ({"shape": "tri", "parameters": {"period_mm": 10**5000}}, BadInput, "is a huge number; expected a number"),
     ({"shape": "tri", "parameters": {"along": 3}}, UnknownName, "unknown value of along '3.0'. Known: x, y"),
-    (
-        {"shape": "tri", "parameters": {"period_mm": float("nan")}},
-        OutOfRange,
-        "period_mm is nan; expected a number from",
-    ),
-    *(
-        (
-            {"shape": array, "parameters": {"period_mm": 30}},
-            OutOfRange,
-            "period_mm 30 is more than the sensor's shorter side, 10 mm",
-        )
-        for array in ("bump", "cone", "pillar", "pyramid")
-    ),
+    *(({"shape": array, "parameters": {"period_mm": 30}}, OutOfRange, "is more than the sensor's shorter side, 10 mm")
+      for array in ("bump", "cone", "pillar", "pyramid")),
     ({"shape": "tri", "tools": {"x60": True}}, BadInput, "tools.x60 is True; expected a whole number"),
     ({"shape": "tri", "tools": {"x60": 10**5000}}, BadInput, "tools.x60 is a huge number; expected 99 or less"),
     ({"shape": "tri", "tools": {"bvoh": 7}}, BadInput, "diabase-h5 has no tool 7"),
@@ -144,14 +114,10 @@ BAD = [
     ({"shape": "tri", "shrinkage": 0.9}, BadInput, "shrinkage is 0.9; expected a number below 0.9"),
     ({"shape": "tri", "nozzle_mm": "0.4"}, BadInput, "nozzle_mm is '0.4'; expected a number"),
     ({"shape": "tri", "waivers": {"rule": "5"}}, BadInput, "expected a list"),
-    (
-        {"shape": "tri", "materials": {"film": "air"}},
-        MissingValue,
-        "no tool for air on diabase-h5: name one with --tool air",
-    ),
+    ({"shape": "tri", "materials": {"film": "air"}}, MissingValue, "no tool for air on diabase-h5: name one with"),
     ({"shape": "tri", "printer": "x\0.yaml"}, BadInput, "embedded null byte"),
     ({"shape": "tri", "name": "x" * 10_000}, BadInput, "cannot be a file name everywhere"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("data", "kind", "message"), BAD, ids=[message for *_, message in BAD])
@@ -178,22 +144,6 @@ def test_every_parameter_is_taken_at_its_limits_and_not_beyond(shape):
             assert design._checked(field, limit) == limit
             with pytest.raises(OutOfRange, match=f"{name} is .*; expected a number from"):
                 design.parameters(shape, {name: limit + beyond})
-
-
-def test_waivers_cover_their_rule_and_body_only():
-    found = [
-        Finding(rule, "warning", body, "m", "a") for rule in ("5-width", "9-bridge") for body in ("film", "isolation")
-    ]
-    named = tri(waivers=[{"rule": "5", "body": "film", "reason": "it was seen"}])
-    assert [bool(f.waiver) for f in named.waived(found)] == [True, False, False, False]
-    whole = tri(waivers=[{"rule": "9-bridge", "reason": "it was seen"}])
-    assert [f.waiver for f in whole.waived(found)] == ["", "", "it was seen", "it was seen"]
-
-
-def test_every_error_is_ours():
-    for data, *_ in BAD:
-        with pytest.raises(SensorgenError):
-            make(data)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -99,9 +99,8 @@ def test_many_digits(name):
     r, y, length = read(standard.line()).sections()
     for k, known in enumerate(standard.known.values()):
         own = [complex(np.ravel(each)[k]) for each in y]
-        found = line_models.exact_impedance(
-            [float(np.ravel(each)[0]) for each in r], own, [float(each) for each in length]
-        )
+        resistance = [float(np.ravel(each)[0]) for each in r]
+        found = line_models.exact_impedance(resistance, own, [float(each) for each in length])
         assert found == pytest.approx(known, rel=3e-16, abs=0)
         assert found.real == pytest.approx(known.real, rel=3e-16, abs=0)
     with pytest.raises(OutOfRange, match="long"):

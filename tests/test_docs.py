@@ -4,14 +4,14 @@ import importlib.util
 import re
 import runpy
 import shlex
-import sys
 from pathlib import Path
 
 import click
 import pytest
 
 import virtual_specimen
-from sensorgen.cli import COMMANDS, cli, main
+from in_process import captured
+from sensorgen.cli import COMMANDS, cli
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "docs" / "tutorial.md"]
@@ -66,10 +66,8 @@ def test_the_first_screen_of_the_readme_is_what_the_command_prints():
 @pytest.mark.parametrize("name", COMMANDS)
 def test_each_command_has_help_and_is_in_the_documents(name):
     assert cli.get_command(None, name).get_short_help_str()
-    assert any(
-        f"sensorgen {name}" in page.read_text("utf-8")
-        for page in [*PAGES, ROOT / "docs" / "lab.md", ROOT / "docs" / "reference.md"]
-    )
+    pages = [*PAGES, ROOT / "docs" / "lab.md", ROOT / "docs" / "reference.md"]
+    assert any(f"sensorgen {name}" in page.read_text("utf-8") for page in pages)
 
 
 @pytest.fixture
@@ -89,10 +87,8 @@ def sensorgen(here, monkeypatch, capfd):
     """Run a command there; fails if it ends otherwise than it may."""
 
     def run(*words, codes=(0,)):
-        monkeypatch.setattr(sys, "argv", ["sensorgen", *map(str, words)])
-        with pytest.raises(SystemExit) as left:
-            main()
-        assert left.value.code in codes, capfd.readouterr().err
+        said = captured(capfd, monkeypatch, *words)
+        assert said.code in codes, said.err
 
     return run
 

@@ -146,10 +146,8 @@ def test_a_hole_stays_open_and_an_absent_body_is_empty():
 
 
 def test_what_is_refused(prints, tmp_path):
-    for name, error, message in (
-        ("body.obj", BadInput, r"expected a name in \.3mf"),
-        ("body", BadInput, "expected a name"),
-    ):
+    wrong = (("body.obj", BadInput, r"expected a name in \.3mf"), ("body", BadInput, "expected a name"))
+    for name, error, message in wrong:
         with pytest.raises(error, match=message):
             export(prints["tri"], tmp_path / name)
     for pitch, message in ((0.0, "above 0"), (0.001, r"million; expected at most 4 million: take --voxel 0\.0")):

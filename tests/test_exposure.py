@@ -12,6 +12,8 @@ from sensorgen.models import pressure
 from sensorgen.models.compression import Plate, averaged, beyond, curve
 from sensorgen.prediction.error_budget import error_budget
 from sensorgen.prediction.query import TONES_HZ, Load
+from sensorgen.prediction.reference_load import Dispersed
+from sensorgen.prediction.rest_state import LOWEST_HZ
 
 FORCE_N, PLACE_M = 6.0, 0.04
 STILL = {
@@ -132,9 +134,8 @@ def test_a_series_circuit_that_is_taken_for_a_parallel_one(hertz):
         return abs(fit.x[0] - FORCE_N)
 
     def slope_off(*other):
-        own, others = (
-            one(FORCE_N + 0.01) - one(FORCE_N - 0.01) for one in (impedance, lambda force: taken(force, *other))
-        )
+        both = impedance, lambda force: taken(force, *other)
+        own, others = (one(FORCE_N + 0.01) - one(FORCE_N - 0.01) for one in both)
         return abs(others / own - 1)
 
     circuits = (farad, -1), (lambda force: parallel(force)[1], 0)
@@ -145,17 +146,13 @@ def test_a_series_circuit_that_is_taken_for_a_parallel_one(hertz):
 
 
 def test_what_a_design_leaves_out_is_no_term_and_what_it_states_has_it_as_source():
-    assert not {"creep", "dispersion", "person", "meter's gain", "meter: series or parallel", "tip tilted"} & set(
-        terms()
-    )
+    left_out = {"creep", "dispersion", "person", "meter's gain", "meter: series or parallel", "tip tilted"}
+    assert not left_out & set(terms())
     given = terms(creep=0.1)
     assert (given["creep"].source, given["cell"].source) == ("the design", "model")
     own = make({"shape": "reference"})
-    assert (
-        own.id()
-        == make({"shape": "reference", "effects": {}}).id()
-        != make({"shape": "reference", "effects": STILL}).id()
-    )
+    empty, still = (make({"shape": "reference", "effects": effects}).id() for effects in ({}, STILL))
+    assert own.id() == empty != still
     budget = error_budget(sensor_of(own, "unconfined"), Load(TONES_HZ, FORCE_N, PLACE_M))
     assert {t.source for t in budget.terms if t.kind in ("drift", "tip", "person", "meter")} == {"guess"}
 
@@ -176,20 +173,13 @@ def test_uneven_pressure_by_integrals():
     rise = 0.8  # from side to side, 8 times the mean: touches over (2/8)^1/2
     tilted = 0.5 - np.log(1 - rise * 0.5) / rise
     assert mean(lambda p: pressure.tilted(rise, p)) == pytest.approx(tilted, rel=1e-4)
-    for shares in (
-        pressure.off_middle(0.1),
-        pressure.off_middle(0.3),
-        pressure.tilted(0.8, 0.1),
-        pressure.tilted(0.1, 0.1),
-    ):
+    tilted = pressure.tilted(0.8, 0.1), pressure.tilted(0.1, 0.1)
+    for shares in (pressure.off_middle(0.1), pressure.off_middle(0.3), *tilted):
         assert shares.mean() == pytest.approx(1, rel=1e-3)
 
 
 def test_dispersion_by_kramers_and_kronig():
     """A permittivity as (j omega)^-n is in phase with its loss: tan(n pi / 2) at every frequency."""
-    from sensorgen.prediction.reference_load import Dispersed
-    from sensorgen.prediction.rest_state import LOWEST_HZ
-
     sensor = sensor_of(make({"shape": "reference"})).sensor
     there = Dispersed(**vars(sensor), permittivity_power=0.04, resistivity_power=0.0).at(10 * LOWEST_HZ)
     admittance = 1j * there.capacitance_f_per_m * (1 - 1j * there.tan_delta) / sensor.capacitance_f_per_m
@@ -233,9 +223,8 @@ def test_beyond_a_cell_the_rise_lies_between_none_and_the_last_slope():
     shares = pressure.tilted(SLOPE * W * K, MEAN_PA)
     with pytest.raises(OutOfRange):
         averaged(flattens, lambda _: shares, MEAN_PA)
-    least, most = (
-        averaged(law, lambda _: shares, MEAN_PA).ratio[-2] - 1 for law in beyond(flattens, MEAN_PA, lambda _: shares)
-    )
+    laws = beyond(flattens, MEAN_PA, lambda _: shares)
+    least, most = (averaged(law, lambda _: shares, MEAN_PA).ratio[-2] - 1 for law in laws)
     assert least < np.mean(1e-3 * np.sqrt(shares * MEAN_PA)) < most
 
 

@@ -7,13 +7,12 @@ read with a noise of 0.1 %, are inverted with the fitted materials, as ratios to
 
 import csv
 import json
-import sys
 
 import lumped_line
 import numpy as np
 import pytest
 
-from sensorgen.cli import main
+from in_process import captured
 
 COUNT, LEVEL = 29, 0.9
 FACTOR = 1.12  # of the default resistivities
@@ -27,12 +26,8 @@ def command(capfd, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
 
     def call(*words):
-        monkeypatch.setattr(sys, "argv", ["sensorgen", *map(str, words)])
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as left:
-            main()
-        said = capfd.readouterr()
-        assert left.value.code == 0, said.err
+        said = captured(capfd, monkeypatch, *words)
+        assert said.code == 0, said.err
         return said.out
 
     return call

@@ -22,11 +22,6 @@ NOTEBOOKS = [
 ]
 
 
-def test_notebooks_use_names_that_there_are():
-    used = {name for path in GALLERY.glob("*.py") for name in re.findall(r"\bsg\.(\w+)\(", path.read_text("utf-8"))}
-    assert "slice_design" in used <= set(sg.__all__)
-
-
 def cells(notebook):
     """Head and text of each cell."""
     for cell in re.split(r"^# %% ?", notebook.read_text("utf-8"), flags=re.MULTILINE)[1:]:

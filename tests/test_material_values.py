@@ -30,16 +30,10 @@ def test_a_value_goes_before_every_source():
     assert x60.sources() == materials.load("x60").sources()
 
 
-def test_a_missing_value_can_be_set():
-    assert materials.load("pla").with_values({"youngs_modulus_pa": 3e9}).value("youngs_modulus_pa").value == 3e9
-
-
 def test_permittivity_scales_a_plate():
     """C = eps0 eps A / d."""
-    plain, half = (
-        rest_state(drawn(design(v)), ranges=False).answer.capacitance_f.lower
-        for v in ({}, {"x60": {"relative_permittivity": 2.34}})
-    )
+    states = (rest_state(drawn(design(v)), ranges=False) for v in ({}, {"x60": {"relative_permittivity": 2.34}}))
+    plain, half = (state.answer.capacitance_f.lower for state in states)
     assert half == pytest.approx(plain / 2, rel=1e-12, abs=0)
 
 
@@ -89,11 +83,9 @@ def test_the_halves_of_a_double_sensor_get_them():
     [
         ({"x61": {"relative_permittivity": 3.0}}, UnknownName, "unknown material 'x61'; did you mean 'x60'"),
         ({"x60": {"permitivity": 3.0}}, UnknownName, "unknown quantity of x60 'permitivity'"),
-        (
-            {"x60": {"relative_permittivity": 0.0}},
-            OutOfRange,
-            "relative_permittivity of x60 is 0; expected 1e-09 to",
-        ),
+        ({"x60": {"relative_permittivity": 0.0}}, OutOfRange, "relative_permittivity of x60 is 0; expected 1e-09 to"),
+        ({"x60": {"relative_permittivity": 0.99e-9}}, OutOfRange, "expected 1e-09 to 1e\\+09"),
+        ({"x60": {"relative_permittivity": 1.01e9}}, OutOfRange, "expected 1e-09 to 1e\\+09"),
         ({"x60": {"relative_permittivity": -1.0}}, OutOfRange, "is -1; expected 1e-09 to 1e"),
         ({"x60": {"youngs_modulus_pa": 0.0}}, OutOfRange, "is 0; expected a number above 0"),
         ({"x60": {"youngs_modulus_pa": float("nan")}}, OutOfRange, "is nan"),
@@ -108,11 +100,6 @@ def test_what_no_material_can_have(values, error, said):
         design(values)
 
 
-@pytest.mark.parametrize("nu", [0.5, 0.4999, 0.0, -1.0])
-def test_limits_of_nu(nu):
-    assert design({"x60": {"poisson_ratio": nu}}).material("x60").value("poisson_ratio").value == nu
-
-
 @pytest.mark.parametrize("value", [1e-9, 1.0, 1e9])
 @pytest.mark.parametrize("shape", ["tri", "rect"])
 def test_the_bounds_hold_over_the_whole_range_of_permittivities(shape, value):
@@ -124,12 +111,6 @@ def test_the_bounds_hold_over_the_whole_range_of_permittivities(shape, value):
     assert 0 < found.lower <= found.upper < np.inf
     assert found.lower <= more.lower
     assert found.upper <= more.upper
-
-
-@pytest.mark.parametrize("value", [0.99e-9, 1.01e9, 1e16, 1e308, float("inf"), float("nan"), 0.0, -1.0])
-def test_a_permittivity_beyond_sense_is_refused(value):
-    with pytest.raises(OutOfRange, match=r"relative_permittivity of x60 is .*; expected 1e-09 to 1e.09"):
-        design({"x60": {"relative_permittivity": value}}, "tri")
 
 
 def test_a_later_value_goes_before_the_designs_own():

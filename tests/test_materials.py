@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from sensorgen.core.errors import MissingValue, UnknownName
+from sensorgen.core.errors import MissingValue
 from sensorgen.design import materials
 
 ALL = [
@@ -67,8 +67,3 @@ def test_a_source_that_is_silent_leaves_the_default():
 def test_a_missing_value_is_missing():
     with pytest.raises(MissingValue, match="no source gives it"):
         materials.load("bvoh").value("relative_permittivity")
-
-
-def test_unknown_material():
-    with pytest.raises(UnknownName, match="unknown material 'x61'; did you mean 'x60'"):
-        materials.load("x61")

@@ -80,10 +80,8 @@ def test_straight_edges_become_one_and_nothing_moves():
     whole = joined(cut.edges)
     assert len(whole) < 0.7 * len(cut.edges)
     for region in range(1, len(cut.regions) + 1):
-        before, after = (
-            shapely.MultiLineString([edge for edge, sides in edges.items() if region in sides])
-            for edges in (cut.edges, whole)
-        )
+        of = ([edge for edge, sides in edges.items() if region in sides] for edges in (cut.edges, whole))
+        before, after = map(shapely.MultiLineString, of)
         assert after.length == pytest.approx(before.length)
         assert after.hausdorff_distance(before) < 1e-9
         assert shapely.polygonize([after]).area == pytest.approx(shapely.polygonize([before]).area)
@@ -95,10 +93,8 @@ def test_steps_that_touch_in_a_corner_are_parted(gap):
     boxes = {"bottom": [(0, 2, 0, 0.1)], "top": [(0, 2, 0.4, 0.5)], "": [
         (0.5 + gap, 1.5 - gap, 0.1, 0.25), (0, 0.5, 0.25, 0.4), (1.5, 2, 0.25, 0.4)
     ]}  # fmt: skip
-    solids = [
-        Body(end or "film", "etpu" if end else "x60", tuple(box(a, b, 0, 1, *z) for a, b, *z in spans), end)
-        for end, spans in boxes.items()
-    ]
+    pieces = {end: tuple(box(a, b, 0, 1, *z) for a, b, *z in spans) for end, spans in boxes.items()}
+    solids = [Body(end or "film", "etpu" if end else "x60", of, end) for end, of in pieces.items()]
     cell = cell_of(Scene(tuple(solids), (2.0, 1.0, 0.5)), 2.0)
     drawn_mm2 = sum((b - a) * (high - low) for spans in boxes.values() for a, b, low, high in spans)
     mesh = mesh_of(cell, Fineness())

@@ -38,9 +38,10 @@ material_values:
   x60: {relative_permittivity: 3.9, youngs_modulus_pa: 4.5e+6}
   etpu: {resistivity_ohm_m: 0.05, youngs_modulus_pa: 18.0e+6}
 """
+TRI = ["tri", "--dielectric", "0.2", "--length", "20"]
 DESIGNS = {
-    "trix": ["tri", "--dielectric", "0.2", "--along", "x", "--length", "20"],
-    "triy": ["tri", "--dielectric", "0.2", "--along", "y", "--length", "20"],
+    "trix": [*TRI, "--along", "x"],
+    "triy": [*TRI, "--along", "y"],
     "rect": ["rect", "--dielectric", "0.1", "--length", "20"],
     "reference": ["reference", "--length", "20"],
     "double": ["double", "--length", "20"],
@@ -48,18 +49,8 @@ DESIGNS = {
     "baked": ["reference", "--length", "22", "--compensate", "bake"],
     "partial": ["tri", "--dielectric", "0.2", "--length", "21"],  # 10 1/2 periods long
     "own": ["own.yaml"],  # 8 1/3 periods long
-    "compensated": ["tri", "--dielectric", "0.2", "--length", "20", "--compensate", "print"],
-    "upside-down": [
-        "tri",
-        "--dielectric",
-        "0.2",
-        "--length",
-        "20",
-        "--orientation",
-        "upside-down",
-        "--support",
-        "bvoh",
-    ],
+    "compensated": [*TRI, "--compensate", "print"],
+    "upside-down": [*TRI, "--orientation", "upside-down", "--support", "bvoh"],
 }
 SLOW = ("own", "compensated", "triy", "upside-down")  # pressed for 20 s, the first two; others go the same ways
 FAST = tuple(name for name in DESIGNS if name not in SLOW)
@@ -124,9 +115,8 @@ class Asked:
     @cached_property
     def record(self):
         """Of a batch with one copy of the design."""
-        (self.folder / "plan.yaml").write_text(
-            json.dumps({"iteration": 60, "designs": [{"design": str(self.file)}]}), "utf-8"
-        )
+        plan = {"iteration": 60, "designs": [{"design": str(self.file)}]}
+        (self.folder / "plan.yaml").write_text(json.dumps(plan), "utf-8")
         self.say("batch", "plan.yaml", "--no-gcode", "--force", "--json")
         return self.folder / "out" / "plan" / "batch.json"
 
@@ -155,9 +145,8 @@ def predict_drawn(asked):
 
 def build(asked):
     """``prediction.json`` and ``check.json``."""
-    prediction, check = (
-        json.loads((asked.built / name).read_text("utf-8")) for name in ("prediction.json", "check.json")
-    )
+    files = (asked.built / name for name in ("prediction.json", "check.json"))
+    prediction, check = (json.loads(file.read_text("utf-8")) for file in files)
     code, _ = asked.say("build", *DESIGNS[asked.name], "--no-cad", "--json")
     return replace(_of_prediction(prediction), errors=(_errors(check["findings"]), code))
 
@@ -227,12 +216,8 @@ def invert(asked):
     from sensorgen.prediction import bodies
     from sensorgen.prediction.sensor_model import sensor_model
 
-    return Answer(
-        *(
-            _of_sensor(asked, lambda design, of=of: sensor_model(of(design))[0])
-            for of in (bodies.default_body, bodies.drawn)
-        )
-    )
+    both = (bodies.default_body, bodies.drawn)
+    return Answer(*(_of_sensor(asked, lambda design, of=of: sensor_model(of(design))[0]) for of in both))
 
 
 def check(asked):
@@ -241,14 +226,12 @@ def check(asked):
     findings = json.loads(out)["findings"]
     gap = next((f for f in findings if f["rule"] == "2-printed-gap"), None)
     if gap:
-        printed, drawn = (
-            float(re.search(of, gap["message"])[1]) for of in (r"([\d.]+) mm \(Arachne[,)]", r"([\d.]+) mm drawn")
-        )
+        told = (r"([\d.]+) mm \(Arachne[,)]", r"([\d.]+) mm drawn")
+        printed, drawn = (float(re.search(of, gap["message"])[1]) for of in told)
     else:
         printed = drawn = asked.answer(predict_drawn).drawn["gap"]["value"] * 1e3
-    return Answer(
-        *({"gap": {"value": gap_mm * 1e-3}} for gap_mm in (printed, drawn)), (_errors(findings), code),
-    )  # fmt: skip
+    gaps = ({"gap": {"value": gap_mm * 1e-3}} for gap_mm in (printed, drawn))
+    return Answer(*gaps, (_errors(findings), code))
 
 
 def python(asked):
@@ -298,9 +281,8 @@ def _at_rest(asked, *how):
     if not said:
         return {"capacitance": None}
     first = said["stress_kpa"].index(0.0)
-    return _of_cell(
-        {end: said[end][first] for end in ("lower_f_per_m2", "upper_f_per_m2")} | {"area_m2": area["area_m2"]}
-    )
+    ends = {end: said[end][first] for end in ("lower_f_per_m2", "upper_f_per_m2")}
+    return _of_cell(ends | {"area_m2": area["area_m2"]})
 
 
 def _of_sensor(asked, model_of):

@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 from drawn_sensor import sensor_of
+from line_cases import PLATE as LINE_PLATE
 from line_cases import TONES, exact
 
 from sensorgen.core.errors import OutOfRange, UnknownName
@@ -28,25 +29,14 @@ from sensorgen.prediction.sheet_study import _press
 K = 2e-6  # 1/Pa: 12 % at 60 kPa
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), EPS0_F_PER_M * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
 TONE = np.array(TONES)
-BY_HAND = {
-    "length_m": 0.1,
-    "width_m": 0.01,
-    "top_thickness_m": 3e-4,
-    "bottom_thickness_m": 3e-4,
-    "top_resistivity_ohm_m": 0.07,
-    "bottom_resistivity_ohm_m": 0.2,
-    "film_m": 6e-4,
-    "eps_r": 4.68,
-    "modulus_pa": 6e6,
-}
 
 
-def by_hand(force, position, top, bottom):
+def by_hand(force, position, top, bottom, hertz=TONE):
     """Inputs of the line, the tip clipped and S_n = k / (W L_p); numbers may be mpmath's."""
     left, right = max(position - 0.005, 0), min(position + 0.005, 0.1)
     area = (right - left) / 100
-    return BY_HAND | {
-        "force_n": force, "left_m": left, "tip_m": right - left,
+    return LINE_PLATE | {
+        "force_n": force, "left_m": left, "tip_m": right - left, "frequency_hz": hertz,
         "top_piezoresistance_per_n": top / area, "bottom_piezoresistance_per_n": bottom / area,
     }  # fmt: skip
 
@@ -54,7 +44,7 @@ def by_hand(force, position, top, bottom):
 @pytest.mark.parametrize("position", [0.0, 0.002, 0.05, 0.0976, 0.1])
 def test_one_patch_is_the_lines_own(position):
     found = replace(PLATE, piezoresistance_per_pa=(K, -K / 4)).impedance(TONE, 3.0, position)
-    expected = line.impedance(line.PressedLine(**by_hand(3.0, position, K, -K / 4), frequency_hz=TONE))
+    expected = line.impedance(line.PressedLine(**by_hand(3.0, position, K, -K / 4)))
     assert found.real == pytest.approx(expected.real, rel=1e-11)
     assert found.imag == pytest.approx(expected.imag, rel=1e-13)
     away = PLATE.impedance(TONE, 3.0, position)
@@ -68,7 +58,7 @@ def test_slopes_against_mpmath(force, position):
     found = replace(PLATE, piezoresistance_per_pa=(K, -K / 4)).response(99.7e3, force, position)
 
     def z(f, x):
-        return exact(digits=200, **by_hand(f, x, K, -K / 4), frequency_hz=99.7e3)
+        return exact(digits=200, **by_hand(f, x, K, -K / 4, 99.7e3))
 
     with mpmath.workdps(50):
         by_force = complex(mpmath.diff(lambda f: z(f, mpmath.mpf(position)), force))
@@ -147,9 +137,8 @@ def design(rise=None, **rest):
 
 def source(name, rise):
     source_folder().mkdir(exist_ok=True)
-    source_path(name).write_text(
-        f"about: a lab\nmaterials: {{etpu: {{piezoresistance_per_pa: {{value: {rise}}}}}}}", "utf-8"
-    )
+    text = f"about: a lab\nmaterials: {{etpu: {{piezoresistance_per_pa: {{value: {rise}}}}}}}"
+    source_path(name).write_text(text, "utf-8")
     return f"etpu@{name}"
 
 
@@ -170,10 +159,9 @@ def test_a_design_sets_it_and_the_prediction_says_so():
     assert sensed.sensor.piezoresistance_per_pa == (K, K)
     assert [t.value for t in sensed.values if t.quantity == "piezoresistance_per_pa"] == [K]  # of one material, once
     found = prediction(design(K))
-    assert [text for text in found.assumptions if "rises with pressure" in text] == [
-        f"resistivity of the {end} electrode rises with pressure by 2e-06 1/Pa (etpu, set by the user)"
-        for end in ("top", "bottom")
-    ]
+    said = "electrode rises with pressure by 2e-06 1/Pa (etpu, set by the user)"
+    of = [text for text in found.assumptions if "rises with pressure" in text]
+    assert of == [f"resistivity of the {end} {said}" for end in ("top", "bottom")]
     assert [v.value for v in found.values if v.quantity == "piezoresistance_per_pa"] == [K]
     assert "piezoresistance" not in {term.name for term in found.budget.terms}
     assert found.impedance == prediction(design()).impedance
@@ -203,13 +191,12 @@ def test_the_budget_has_what_sources_disagree_on(top, bottom, ends):
     rho = dict(zip(("top_resistivity_ohm_m", "bottom_resistivity_ohm_m"), sensed.sensor.resistivity_ohm_m, strict=True))
 
     def z(rises):
-        return line.impedance(line.PressedLine(**by_hand(6.0, 0.05, *rises) | rho, frequency_hz=TONE))
+        return line.impedance(line.PressedLine(**by_hand(6.0, 0.05, *rises) | rho))
 
     ref, found = z(sensed.sensor.piezoresistance_per_pa), terms["piezoresistance"].changes
     for measure, part in {"magnitude": np.abs, "re": np.real, "im": np.imag}.items():
-        assert getattr(found, measure) == pytest.approx(
-            max(abs(part(z(e)) / part(ref) - 1).max() for e in ends), rel=1e-8
-        )
+        expected = max(abs(part(z(e)) / part(ref) - 1).max() for e in ends)
+        assert getattr(found, measure) == pytest.approx(expected, rel=1e-8)
     assert "1/Pa" in terms["piezoresistance"].what
     sure = design(K, materials=named)  # the user's own value is not doubted
     assert "piezoresistance" not in {term.name for term in error_budget(sensor_of(sure), load).terms}

@@ -9,14 +9,8 @@ from sensorgen.core import files as places
 from sensorgen.design.materials import source_folder
 from sensorgen.measure.log import logbook
 
-VARIABLES = (
-    "XDG_CACHE_HOME",
-    "XDG_DATA_HOME",
-    "LOCALAPPDATA",
-    "SENSORGEN_CACHE",
-    "SENSORGEN_LOG",
-    "SENSORGEN_MATERIALS",
-)
+OWN = ("SENSORGEN_CACHE", "SENSORGEN_LOG", "SENSORGEN_MATERIALS")
+VARIABLES = ("XDG_CACHE_HOME", "XDG_DATA_HOME", "LOCALAPPDATA", *OWN)
 CACHE, LOG, MATERIALS = cached.folder, logbook.place, source_folder
 
 

@@ -12,10 +12,14 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.design.tip import EVEN
+from sensorgen.models import fem2d, press2d
+from sensorgen.models.compression import curve_of
+from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.prediction import compression_law as celllaw
 from sensorgen.prediction import rest_state, sensor_model
 from sensorgen.prediction.bodies import drawn, estimated
 from sensorgen.prediction.capacitance import PLANE, Answer
+from sensorgen.prediction.mesh_ladder import Case, pressed
 from sensorgen.prediction.query import Load as Press
 from sensorgen.prediction.query import Tip
 from sensorgen.prediction.sensor_model import piece
@@ -28,6 +32,15 @@ needs_mesher = pytest.mark.skipif("not __import__('importlib').util.find_spec('n
 
 def tri(dielectric_mm):
     return make({"shape": "tri", "parameters": {"dielectric_mm": dielectric_mm}})
+
+
+def reference(name):
+    return json.loads((Path(__file__).parent / "reference" / f"{name}.json").read_text("utf-8"))
+
+
+def rise(law, load):
+    """Rise of C by a law, under the pressure of a load of a reference."""
+    return float(1 / (1 - law.capacitive_strain(np.asarray(1e3 * load["pressure_kpa"]))[0]) - 1)
 
 
 def worked_out(design, accuracy, press=PRESS, law="", **tip):
@@ -60,11 +73,11 @@ def test_without_an_accuracy_no_cell_is_solved_in_3d():
 
 def test_a_cell_in_3d_has_an_interval_far_beyond_its_prototype():
     """At 1103 kPa: the rise by another program, neo-Hookean, lies within."""
-    large = json.loads((Path(__file__).parent / "reference" / "rect_rise.json").read_text("utf-8"))["large"]
+    large = reference("rect_rise")["large"]
     cell = make({"shape": "rect", "parameters": {k: v for k, v in large.items() if k != "meshes"}})
     exact = large["meshes"][-1]["loads"][-1]
     law = worked_out(cell, None, Press(TONES, exact["pressure_kpa"] * 1e3 * 1e-4, 0.05))[0].law  # on 1 cm2
-    least, most = (float(1 / (1 - c.capacitive_strain(exact["pressure_kpa"] * 1e3)[0]) - 1) for c in law.others)
+    least, most = (rise(c, exact) for c in law.others)
     assert law.bounded
     assert least < 0.01 < exact["rise"] < most < 4
     assert any("none and that of the closed cell" in doubt for doubt in law.doubts)
@@ -72,7 +85,7 @@ def test_a_cell_in_3d_has_an_interval_far_beyond_its_prototype():
 
 def test_the_printed_prototype_in_3d_is_stored_up_to_table_1_1():
     """Range of the stored law holds what another program gives on two meshes; other films have none stored."""
-    large = json.loads((Path(__file__).parent / "reference" / "rect_rise.json").read_text("utf-8"))["large"]
+    large = reference("rect_rise")["large"]
     ends = {}
     for film_mm in (0.2, 0.1):
         cell = make({"shape": "rect", "parameters": {"dielectric_mm": film_mm}})
@@ -81,8 +94,7 @@ def test_the_printed_prototype_in_3d_is_stored_up_to_table_1_1():
     assert ends[0.1] == ()
     for mesh in large["meshes"][1:]:
         for load in mesh["loads"]:
-            stress_pa = np.asarray(1e3 * load["pressure_kpa"])
-            least, most = (float(1 / (1 - c.capacitive_strain(stress_pa)[0]) - 1) for c in ends[0.2])
+            least, most = (rise(c, load) for c in ends[0.2])
             assert least < load["rise"] < most < 1.4 * least
 
 
@@ -91,11 +103,10 @@ def test_the_printed_prototype_in_3d_is_stored_up_to_table_1_1():
 @pytest.mark.parametrize("cell", [0, 1])
 def test_a_drawn_section_solved_up_to_table_1_1_holds_another_program(cell):
     """At 345, 600 and 1103 kPa, where the flanks of tri have rolled onto each other: NGSolve on two meshes."""
-    known = json.loads((Path(__file__).parent / "reference" / "tri_contact.json").read_text("utf-8"))["cells"][cell]
+    known = reference("tri_contact")["cells"][cell]
     law = celllaw.solved(tri(known["parameters"]["dielectric_mm"]), tip=Tip(block=EVEN), until_pa=1.103e6)
     for load in (load for mesh in known["meshes"] for load in mesh["loads"]):
-        stress_pa = np.asarray(1e3 * load["pressure_kpa"])
-        least, most = (float(1 / (1 - c.capacitive_strain(stress_pa)[0]) - 1) for c in law.others)
+        least, most = (rise(c, load) for c in law.others)
         assert least < load["rise"] < most < 1.06 * least
 
 
@@ -173,8 +184,6 @@ def test_a_law_that_is_asked_for_is_taken_whatever_its_error():
 
 
 def test_the_outline_says_what_is_expected_and_asks_nothing_dear(monkeypatch):
-    from sensorgen.models import fem2d, press2d
-
     for model in (fem2d, press2d):
         monkeypatch.setattr(model, "press" if model is press2d else "capacitance", None)
     outline = sensor_model.plan(drawn(tri(0.15)), PRESS, 1e-2)
@@ -196,17 +205,12 @@ def test_an_accuracy_is_above_0(accuracy):
 @pytest.mark.parametrize("force_n", [0.1, 0.2, 0.5])
 def test_a_light_press_below_the_first_stress_of_a_curve_is_within_what_is_claimed(force_n):
     """A contact grows from nothing: the stored curve begins at 10 kPa, the same cell is solved at 1, 2 and 5."""
-    from sensorgen.models.compression import curve_of
-    from sensorgen.models.press2d import BoundaryConditions
-    from sensorgen.prediction.mesh_ladder import Case, pressed
-    from sensorgen.prediction.sensor_model import piece as piece_of
-
     design = tri(0.1)
     press = Press((1.0,), force_n, 0.05)
     sensed, plan = worked_out(design, 1e-3, press)
-    piece = piece_of(drawn(design))
+    of = piece(drawn(design))
     eps = {t.material: t.value for t in sensed.values if t.quantity == "relative_permittivity"}
-    case = Case(piece, "press2d", celllaw.elastic(design, piece.scene), eps, BoundaryConditions())
+    case = Case(of, "press2d", celllaw.elastic(design, of.scene), eps, BoundaryConditions())
     fine = curve_of(pressed(case, (0.0, 1e3, 2e3, 5e3)))
     claimed = next(c.width for c in plan.levels[1].candidates if c.model == "solved")
     assert off(sensed.sensor, replace(sensed.sensor, compression=fine), press) < claimed < 1e-3

@@ -103,12 +103,6 @@ def test_outlines_that_share_edges_leave_nothing_between_them():
     assert sum(found.values()) == pytest.approx(12.0, rel=1e-12)
 
 
-def test_layers_stand_from_bottom_to_top():
-    hat = upright("hat", regular(6, 0.5), 0.9, 1.1)
-    (part,) = overlay_parts(scene(hat, upright("foot", regular(6, 0.9), 0.3, 0.9)))
-    assert {tuple(layer.bottom_mm[0] for layer in c.layers) for c in part.columns} == {(0,), (0, 0.3), (0, 0.3, 0.9)}
-
-
 def test_boxes_whose_sides_are_told_otherwise_are_the_same_boxes():
     """Prisms along x or y that are boxes may stand beside pillars."""
     beam = Body("beam", "x60", (Prism("x", rectangle(1.0, 2.0, 0.3, 0.6), 0.0, 4.0),))
@@ -135,20 +129,12 @@ WEDGE = Prism("y", ((0.0, 0.3), (1.0, 0.3), (0.5, 0.8)), 0.0, 3.0)
         ([upright("a", regular(8, 1.0), 0.3, 1.0), upright("b", regular(8, 0.5), 0.9, 1.2)], "a and b at z = 0.9"),
         ([Body("a", "x60", tuple(Prism("z", regular(5, 0.5, (x, 1.0)), 0.3, 1.0) for x in (1.0, 1.5)))], "a and a"),
         ([upright("a", ((0, 0), (3, 0), (1, 1), (3, 1.5)), 0.3, 1.0)], "a crosses itself: Self-intersection"),
-        (
-            [upright("a", regular(8, 1.0), 0.3, 1.0), Body("wedge", "x60", (WEDGE,))],
-            "wedge is slanted or curved",
-        ),
+        ([upright("a", regular(8, 1.0), 0.3, 1.0), Body("wedge", "x60", (WEDGE,))], "wedge is slanted or curved"),
     ],
 )
 def test_what_has_no_plan_is_refused(bodies, said):
     with pytest.raises(ValueError, match=said):
         overlay_parts(scene(*bodies))
-
-
-def test_bodies_that_touch_do_not_overlap():
-    touching = [upright("a", regular(8, 1.0), 0.3, 0.9), upright("b", regular(5, 0.5), 0.9, 1.2)]
-    assert len(areas(scene(*touching))) == 3
 
 
 def test_places_of_a_grid_are_inside_as_shapely_says_of_each():

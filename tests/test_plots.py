@@ -11,6 +11,7 @@ from itertools import islice
 import numpy as np
 import pytest
 from drawn_sensor import sensor_of
+from line_cases import PLATE
 
 from sensorgen.analysis import plots
 from sensorgen.analysis.plots import figure as figure_data
@@ -32,18 +33,6 @@ from sensorgen.models import line
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Response, Sensor
 
-PLATE = {
-    "length_m": 0.1,
-    "width_m": 0.01,
-    "top_thickness_m": 3e-4,
-    "bottom_thickness_m": 3e-4,
-    "top_resistivity_ohm_m": 0.07,
-    "bottom_resistivity_ohm_m": 0.2,
-    "film_m": 6e-4,
-    "eps_r": 4.68,
-    "modulus_pa": 6e6,
-    "tip_m": 0.01,
-}
 TONES, FORCES, AT = (10.1e3, 99.7e3), (0.0, 2.0, 4.0, 6.0), (0.0, 20.0, 40.0, 60.0, 100.0)
 
 
@@ -60,7 +49,8 @@ def answer(sensor):
 
 def at_point(f, force, x_mm):
     """The plate of the reference design, pressed with the whole tip on it, straight from the line."""
-    return complex(line.impedance(line.PressedLine(**PLATE, frequency_hz=f, force_n=force, left_m=x_mm / 1e3 - 0.005)))
+    press = {"frequency_hz": f, "force_n": force, "left_m": x_mm / 1e3 - 0.005}
+    return complex(line.impedance(line.PressedLine(**PLATE | press)))
 
 
 def test_values_are_those_of_the_line(answer):
@@ -114,14 +104,8 @@ def test_a_map_that_folds_and_one_that_does_not(answer):
     [
         ((TONES, (3.0,), AT), "1 force.s. and 5 position.s. make no map; expected two or more of each"),
         ((TONES, FORCES, (3.0,)), "4 force.s. and 1 position.s. make no map"),
-        (
-            (range(1, MOST_FREQUENCIES + 2), FORCES, AT),
-            f"{MOST_FREQUENCIES + 1} frequencies, 4 forces and 5 positions are too much",
-        ),
-        (
-            ((1e3,), range(1000), np.linspace(0, 100, LARGEST // 1000 + 1)),
-            f"expected up to {MOST_FREQUENCIES} frequencies",
-        ),
+        ((range(1, MOST_FREQUENCIES + 2), FORCES, AT), "frequencies, 4 forces and 5 positions are too much"),
+        (((1e3,), range(1000), np.linspace(0, 100, LARGEST // 1000 + 1)), f"expected up to {MOST_FREQUENCIES} freq"),
         ((TONES, FORCES, (0.0, 100.5)), "position 100.5 mm is outside the sensor"),
         ((TONES, (0.0, 500.0), AT), "the stress thins the film by 1.67: at 1 its electrodes touch"),
     ],
@@ -167,12 +151,6 @@ def test_all_files_and_the_same_bytes_every_time(sensor, again):
             assert b"tIME" not in content
     figure = shown(quantity(response(sensor, TONES[:1], FORCES, AT), "resistance"))
     assert size_of(first["resistance.png"])[0] == round(figure.get_figwidth() * figure.dpi)
-
-
-def test_seven_tones_fit_in_1200_pixels(sensor):
-    seven = response(sensor, [k * 1e4 for k in range(1, 8)], FORCES, AT)
-    drawn = [shown(of) for of in (quantity(seven, "resistance"), inverse(seven, "force"))]
-    assert [round(of.get_figwidth() * of.dpi) for of in drawn] == [1200, 1200]
 
 
 def shown(figure):

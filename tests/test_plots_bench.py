@@ -10,7 +10,6 @@ import pytest
 
 from sensorgen.analysis.plots import recordings as bench
 from sensorgen.analysis.plots import static
-from sensorgen.analysis.plots.figure import thinned
 from sensorgen.measure.recording import Recording, RecordingClock, Source
 from sensorgen.measure.recording.samples import blank
 from sensorgen.measure.signal import lowpass, presses
@@ -32,20 +31,6 @@ def run():
     )
 
 
-def test_decimated_curves_keep_their_spikes_and_ends():
-    rng = np.random.default_rng(0)
-    t, y = np.arange(100_000) / 140, rng.standard_normal(100_000)
-    y[54_321], y[70_000:70_010] = 50, np.nan
-    at = thinned(y)
-    x, shown = t[at], y[at]
-    assert len(x) < 3100
-    assert (np.diff(x) > 0).all()
-    assert (np.nanmax(shown), x[np.nanargmax(shown)]) == (50, t[54_321])
-    assert np.nanmin(shown) == np.nanmin(y)
-    assert x[-1] == t[-1]
-    np.testing.assert_array_equal(thinned(y[:50]), np.arange(50))
-
-
 def test_pictures_are_drawn_and_the_same_every_time(run):
     for figure in (bench.series(run), bench.differences(run, "reactance")):
         first = static.png(figure)
@@ -56,12 +41,6 @@ def test_pictures_are_drawn_and_the_same_every_time(run):
     assert static.png(bench.compared(sets, run.tones_hz)).startswith(b"\x89PNG")
     plan = RunPlan(1, 20, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0)
     assert static.png(bench.schedule(plan.steps(), plan.seconds())).startswith(b"\x89PNG")
-
-
-def test_a_surface_goes_through_its_presses(run):
-    through = presses.surface(run.pairs.force_n, run.pairs.position_mm, run.pairs.difference_ohm.imag)
-    assert through.values.shape[2] == 3
-    assert np.nanmax(through.values[..., 0]) == pytest.approx(run.pairs.difference_ohm[:, 0].imag.max(), rel=0.1)
 
 
 def test_the_page_has_every_tone_and_asks_no_network(run):

@@ -15,32 +15,19 @@ from drawn_sensor import sensor_of
 from line_cases import PLATE as LINE_PLATE
 from line_cases import exact as exact_line
 
-from sensorgen.core.bounds import Interval
-from sensorgen.core.errors import MissingValue, OutOfRange
-from sensorgen.design import materials
+from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
+from sensorgen.design.values import spread
 from sensorgen.models import line
-from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction import quantities
 from sensorgen.prediction.bodies import drawn, estimated
-from sensorgen.prediction.capacitance import Unpredictable, capacitance
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.loaded import (
-    FORCES_N,
-    LARGEST,
-    ROWS,
-    ImpedanceGrid,
-    Loaded,
-    csv_blocks,
-    grid,
-    positions_mm,
-)
+from sensorgen.prediction.loaded import LARGEST, ROWS, ImpedanceGrid, Loaded, csv_blocks, grid, positions_mm
 from sensorgen.prediction.query import NOISE, TONES_HZ, Query
 from sensorgen.prediction.rest_state import Lost, rest_state
 from sensorgen.prediction.results import from_json, to_json
 from sensorgen.prediction.sensor_model import sensor_model
 
-EPS = {"x60": 4.68, "air": 1.00059}
 TABLE_3_2 = {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesis-3.2"}  # 1.2 S/m
 TABLE_C_1 = {"top_electrode": "etpu@thesis-c.1-top", "bottom_electrode": "etpu@thesis-c.1-bottom"}  # 0.07, 0.2 ohm m
 PLATE_F = 69.06266493984e-12  # eps0 4.68 100 x 10 / 0.6 mm
@@ -93,24 +80,8 @@ def test_each_electrode_has_its_own_resistivity(end):
         assert r.model.upper >= expected[name] * (1 - 1e-6)
 
 
-def test_the_conductivity_printed_for_x60_is_kept_but_never_a_default():
-    """Table 3.2's 1.3 S/m would make the dielectric the better conductor (errata)."""
-    x60 = materials.load("x60")
-    assert x60.value("resistivity_ohm_m", "thesis-3.2").implausible
-    assert 1 / x60.value("resistivity_ohm_m", "thesis-3.2").value == pytest.approx(1.3)
-    with pytest.raises(MissingValue, match="no default resistivity_ohm_m"):
-        x60.value("resistivity_ohm_m")
-    for source in sorted(x60.sources() - {"thesis-3.2"}):
-        with pytest.raises(MissingValue):
-            x60.value("resistivity_ohm_m", source)
-
-
 def test_a_value_that_no_source_gives_is_a_range_that_is_named():
     """PLA in between: the range holds its permittivity by handbooks, 2.5 to 3.5, and the verdict is conditional."""
-    from dataclasses import replace
-
-    from sensorgen.design.values import spread
-
     design = make({"shape": "reference", "materials": {"dielectric": "pla"}})
     found = prediction(design)
     value = next(v for v in found.values if (v.material, v.quantity) == ("pla", "relative_permittivity"))
@@ -166,9 +137,10 @@ def test_capacitances_of_the_thesis_sensors():
         assert bounds.lower <= bounds.model.lower < bounds.upper
 
 
-def test_impedance_at_the_tones_is_coth():
-    found = prediction(make({"shape": "reference"}))
-    assert [row.frequency_hz for row in found.impedance] == list(TONES_HZ)
+@pytest.mark.parametrize("asked", [{}, {"frequency_hz": (1e3, 1e6)}])
+def test_impedance_at_the_tones_is_coth(asked):
+    found = prediction(make({"shape": "reference"}), **asked)
+    assert [row.frequency_hz for row in found.impedance] == list(asked.get("frequency_hz", TONES_HZ))
     resistance = 2 * 0.042 / 3e-5
     for row in found.impedance:
         y = 2j * math.pi * row.frequency_hz * PLATE_F
@@ -191,10 +163,8 @@ def test_the_range_of_a_response_has_the_ways_to_print_at_its_ends(monkeypatch, 
     model = sensor_model(estimated(design), query)[0]
     monkeypatch.setattr(quantities, "at_a_few_pressures", lambda *_, **__: model.law)
     found = [s.capacitance_f() for s in quantities._printed_otherwise(model, query.load(design), query)]
-    each = [
-        rest_state(estimated(design, walls), ranges=False).capacitance.value
-        for walls in ("arachne", "classic", "cura", "cura-gaps")
-    ]
+    bodies = [estimated(design, walls) for walls in ("arachne", "classic", "cura", "cura-gaps")]
+    each = [rest_state(body, ranges=False).capacitance.value for body in bodies]
     ends = {min(each), max(each)} - {each[0]}
     assert sorted(found) == pytest.approx(sorted(ends), rel=2e-2, abs=0)
     assert ends
@@ -236,71 +206,6 @@ def test_predictions_of_schema_2_are_read():
     assert old.drawn.position_resolution.unit == "m"
 
 
-def test_the_tones_are_those_of_table_5_1_with_its_slip_corrected():
-    """Errata: 4990 stands for 49900."""
-    assert TONES_HZ == (1100.0, 2300.0, 5300.0, 10100.0, 19900.0, 49900.0, 99700.0)
-
-
-class Model:
-    """A capacitance model that answers, or refuses."""
-
-    def __init__(self, cost: int, lower: float, upper: float, reason: str = "") -> None:
-        self.COST, self.reason, self.asked = cost, reason, 0
-        self.bounds = Interval(lower, upper)
-
-    def why_not_applicable(self, scene):
-        return self.reason or None
-
-    def capacitance(self, scene, permittivity):
-        self.asked += 1
-        return self.bounds
-
-
-@pytest.fixture
-def ladder(monkeypatch, tmp_path):
-    """A function that puts models, cheapest first, in the place of the registered ones."""
-
-    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / "cache"))
-
-    def put(*found: Model) -> None:
-        monkeypatch.setattr(planner, "capacitance_models", lambda: {f"m{k}": m for k, m in enumerate(found)})
-
-    return put
-
-
-def test_the_cheapest_model_that_is_narrow_enough_answers(ladder):
-    rough, good, best = Model(0, 1.0, 2.0), Model(1, 1.4, 1.5), Model(2, 1.44, 1.45)
-    ladder(rough, good, best)
-    assert capacitance(make({"shape": "tri"}).drawn, EPS, width=0.1).model == "m1"
-    assert (rough.asked, good.asked, best.asked) == (1, 1, 0)
-
-
-def test_the_narrowest_answers_where_none_is_narrow_enough(ladder):
-    ladder(Model(0, 1.0, 2.0), Model(1, 1.4, 1.5), Model(2, 1.0, 3.0))
-    assert capacitance(make({"shape": "tri"}).drawn, EPS, width=1e-6).model == "m1"
-
-
-def test_refusals_are_passed_on(ladder):
-    ladder(Model(0, 1.0, 2.0, reason="too slanted"), Model(1, 1.4, 1.5))
-    answer = capacitance(make({"shape": "tri"}).drawn, EPS)
-    assert (answer.model, answer.refused) == ("m1", ("m0: too slanted",))
-
-
-def test_when_all_refuse_their_reasons_are_told(ladder):
-    ladder(Model(0, 1.0, 2.0, reason="too slanted"), Model(1, 1.4, 1.5, reason="too tall"))
-    with pytest.raises(Unpredictable, match="m0: too slanted; m1: too tall"):
-        capacitance(make({"shape": "tri"}).drawn, EPS, keep=False)
-
-
-def test_other_tones():
-    found = prediction(make({"shape": "reference"}), frequency_hz=(1e3, 1e6))
-    assert [row.frequency_hz for row in found.impedance] == [1e3, 1e6]
-    resistance = 2 * 0.042 / 3e-5
-    y = 2j * math.pi * 1e6 * PLATE_F
-    z = cmath.sqrt(resistance / y) / cmath.tanh(cmath.sqrt(resistance * y))
-    assert (found.impedance[1].re.value, found.impedance[1].im.value) == (close(z.real, 1e-9), close(z.imag, 1e-9))
-
-
 @pytest.fixture(scope="module")
 def plate():
     """The plate of Table 3.1 with the electrodes of Table C.1, free to expand (B.49), and its design."""
@@ -312,10 +217,8 @@ def exact(f, force, x_mm):
     """B.53 and B.49 with 40 digits: three sections by their transfer, the tip of 10 mm wholly on the sensor."""
     with mpmath.workdps(40):
         r = mpmath.mpf("0.07") / (mpmath.mpf("3e-4") * mpmath.mpf("0.01")) * (1 + mpmath.mpf(20) / 7)
-        loose = (
-            2j * mpmath.pi * mpmath.mpf(f) * mpmath.mpf("8.8541878128e-12") * mpmath.mpf("4.68") * mpmath.mpf("0.01")
-        )
-        loose /= mpmath.mpf("6e-4")
+        loose = 2j * mpmath.pi * mpmath.mpf(f) * mpmath.mpf("8.8541878128e-12") * mpmath.mpf("4.68")
+        loose *= mpmath.mpf("0.01") / mpmath.mpf("6e-4")
         pressed = loose / (1 - mpmath.mpf(force) / (mpmath.mpf("0.01") ** 2 * 6000000))
         left = mpmath.mpf(x_mm) / 1000 - mpmath.mpf("0.005")
         z = mpmath.inf
@@ -354,10 +257,6 @@ def test_positions_span_the_sensor_and_end_on_it():
         assert list(found) == sorted(set(found))
 
 
-def test_forces_that_are_taken_where_none_is_named():
-    assert tuple(k / 10 for k in range(61)) == FORCES_N
-
-
 @pytest.mark.parametrize(
     ("forces", "at_mm", "said"),
     [
@@ -385,13 +284,6 @@ def test_a_force_beyond_a_solved_curve_is_named_once():
     assert str(caught.value).count("press") == 0
 
 
-def test_a_grid_has_its_axes(plate):
-    found = Loaded(None, plate[1], ((1e3, 2e3), (0.0, 1.0, 2.0), (0.0, 50.0)), NOISE).impedance
-    assert (found.frequency_hz, found.force_n, found.position_mm) == ((1e3, 2e3), (0.0, 1.0, 2.0), (0.0, 50.0))
-    assert found.impedance_ohm[1][2][1].real == close(exact(2e3, 2, 50).real, 1e-10)
-    assert found.impedance_ohm[1][2][1].imag == close(exact(2e3, 2, 50).imag, 1e-12)
-
-
 def test_too_many_impedances_for_the_memory(plate):
     said = f"1 x 1415 x 1414 frequencies, forces and positions; expected at most {LARGEST} impedances at once"
     with pytest.raises(OutOfRange, match=said):
@@ -410,32 +302,13 @@ def test_moves_are_counted_in_deviations_of_a_reading():
     assert NOISE == 1e-3
 
 
-def read(blocks):
-    rows = list(csv.reader(io.StringIO("".join(blocks))))
-    return rows[0], np.array(rows[1:], float)
-
-
-def test_csv_holds_what_the_plain_data_hold(plate):
-    _, sensed = plate
-    axes = (TONES_HZ, (0.0, 0.1, 0.2), (0.0, 3.0, 99.9))
-    head, rows = read(csv_blocks(sensed.sensor, *axes))
-    assert head[:6] == ["force_n", "position_mm", "re_ohm_1.1kHz", "im_ohm_1.1kHz", "re_ohm_2.3kHz", "im_ohm_2.3kHz"]
-    assert head[-1] == "im_ohm_99.7kHz"
-    assert rows[:, :2].tolist() == [[f, x] for f in axes[1] for x in axes[2]]
-    found = Loaded(None, sensed, axes, NOISE).impedance.impedance_ohm
-    for k in range(7):
-        assert rows[:, 2 + 2 * k] == close(np.ravel(found[k].real), 1e-14)
-        assert rows[:, 3 + 2 * k] == close(np.ravel(found[k].imag), 1e-14)
-
-
 @pytest.mark.parametrize("count", [ROWS - 1, ROWS, ROWS + 1])
 def test_csv_loses_no_row_between_blocks(plate, count):
     at = np.linspace(5, 95, count)
-    blocks = list(csv_blocks(plate[1].sensor, [1e3], [1.0, 2.0], at))
-    assert [text.count("\n") for text in blocks[1:]] == [ROWS] * (2 * count // ROWS) + (
-        [2 * count % ROWS] if 2 * count % ROWS else []
-    )
-    _, rows = read(blocks)
+    _, *blocks = csv_blocks(plate[1].sensor, [1e3], [1.0, 2.0], at)
+    whole, left = divmod(2 * count, ROWS)
+    assert [text.count("\n") for text in blocks] == [ROWS] * whole + [left] * bool(left)
+    rows = np.array(list(csv.reader(io.StringIO("".join(blocks)))), float)
     assert np.array_equal(rows[:, 1], np.tile(at, 2))
     assert np.array_equal(rows[:, 0], np.repeat([1.0, 2.0], count))
     assert rows[count, 2] == close(exact(1e3, 2, 5).real, 1e-10)
@@ -454,11 +327,8 @@ def test_csv_of_many_rows_needs_no_more_memory(plate):
     assert peaks[1] < 1.1 * peaks[0] < 10e6
 
 
-LOSSY = {
-    "shape": "reference",
-    "materials": TABLE_C_1,
-    "material_values": {"x60": {"loss_tangent": 0.02, "resistivity_ohm_m": 1e9}},
-}
+LOSSES = {"x60": {"loss_tangent": 0.02, "resistivity_ohm_m": 1e9}}
+LOSSY = {"shape": "reference", "materials": TABLE_C_1, "material_values": LOSSES}
 AREA_M2, FILM_M = 1e-3, 6e-4
 
 
@@ -466,12 +336,8 @@ def test_losses_reach_the_line():
     """Of a plate: y = (tan delta + j) omega C + A / (rho d), by transfer matrices in 60 digits."""
     found = prediction(make(LOSSY))
     for row in found.impedance:
-        z = exact_line(
-            60, **LINE_PLATE | {
-                "frequency_hz": row.frequency_hz, "tan_delta": 0.02, "force_n": 0,
-                "leak_s_per_m": 0.01 / (1e9 * FILM_M),
-            }
-        )  # fmt: skip
+        lossy = {"tan_delta": 0.02, "force_n": 0, "leak_s_per_m": 0.01 / (1e9 * FILM_M)}
+        z = exact_line(60, **LINE_PLATE | lossy | {"frequency_hz": row.frequency_hz})
         assert row.re.value == pytest.approx(float(z.real), rel=1e-6)
         assert row.im.value == pytest.approx(float(z.imag), rel=1e-6)
     assert "dielectric losses: loss_tangent of x60 and resistivity_ohm_m of x60 as given" in found.assumptions

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from sensorgen.core.errors import BadInput, UnknownName
-from sensorgen.design import materials, printer
+from sensorgen.design import printer
 
 
 @pytest.fixture
@@ -22,20 +22,6 @@ def own(tmp_path):
     return write
 
 
-@pytest.mark.parametrize("name", printer.printer_names())
-def test_five_tools_that_slicers_count_from_zero(name):
-    machine = printer.load_printer(name)
-    assert machine.name == name
-    assert [machine.slicer_index(tool) for tool in machine.tool_numbers] == list(range(5))
-    assert set(machine.default_tools) <= set(materials.names())
-
-
-def test_the_five_tool_printer_of_the_thesis():
-    machine = printer.load_printer("diabase-h5")
-    assert (machine.bed_mm, machine.nozzle_mm, machine.tool_numbers) == ((390.0, 170.0), 0.4, (1, 2, 3, 4, 5))
-    assert machine.nozzle_mm * machine.line_width_ratio == pytest.approx(0.44)
-
-
 @pytest.mark.parametrize(("name", "layer"), [("fine", 0.1), ("extrafine", 0.06)])
 def test_layers_of_the_qualities(name, layer):
     quality = printer.load_quality(name)
@@ -43,15 +29,6 @@ def test_layers_of_the_qualities(name, layer):
     grid = quality.boundaries_mm(1.0)
     assert grid[:3] == (0.0, layer, pytest.approx(2 * layer))
     assert grid[-2] < 1.0 <= grid[-1]
-
-
-def test_a_height_on_the_grid_needs_no_further_layer():
-    assert printer.load_quality("fine").boundaries_mm(0.3) == (0.0, 0.1, 0.2, 0.3)
-
-
-def test_bed_centre():
-    assert printer.load_printer("diabase-h5").bed_centre_mm() == (0.0, 0.0)
-    assert printer.load_printer("prusa-xl5").bed_centre_mm() == (180.0, 180.0)
 
 
 def test_a_printer_of_the_users_own(own):
@@ -130,10 +107,6 @@ def test_a_file_may_narrow_limits_but_not_widen_them_unasked(own, monkeypatch, o
         printer.load_printer(file)
     monkeypatch.setenv(printer.TRUST, "1")
     printer.load_printer(file)
-
-
-def test_a_file_that_narrows_limits_is_taken(own):
-    assert printer.load_printer(own("max_nozzle_c: 250.0", "max_nozzle_c: 200")).max_nozzle_c == 200
 
 
 def test_a_macro_that_homes_nothing_is_no_homing(own):

@@ -94,13 +94,6 @@ def test_lanes_stay_for_several_rounds(tmp_path, monkeypatch):
     assert os.environ["OPENBLAS_NUM_THREADS"] == "7"
 
 
-def test_a_chunk_that_kills_twice_is_divided():
-    (twice,) = parallel._Chunk((1, 2, 3)).after_death()
-    assert twice.numbers == (1, 2, 3)
-    assert [c.numbers for c in twice.after_death()] == [(1,), (2,), (3,)]
-    assert twice.after_death()[0].after_death() == []
-
-
 def test_works_that_are_stopped_go_on_where_they_were(tmp_path, monkeypatch):
     monkeypatch.setenv(cache.PLACE, str(tmp_path))
     works = [(k,) for k in range(6)]
@@ -110,11 +103,12 @@ def test_works_that_are_stopped_go_on_where_they_were(tmp_path, monkeypatch):
     with cache.only_known():
         assert [asked(k) for k in range(3)] == [0, 1, 4]
     handed = []
-    monkeypatch.setattr(
-        parallel,
-        "in_parallel",
-        lambda w, some, *_, **__: handed.append(len(some)) or ((k, w(*s)) for k, s in enumerate(some)),
-    )
+
+    def counted(work, some, *_, **__):
+        handed.append(len(some))
+        return ((k, work(*s)) for k, s in enumerate(some))
+
+    monkeypatch.setattr(parallel, "in_parallel", counted)
     assert dict(remembered(asked, works, 1)) == {k: k**2 for k in range(6)}
     assert handed == [2]
 

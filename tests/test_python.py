@@ -78,9 +78,7 @@ def test_lines_of_a_figure_are_the_impedances(results):
 
 def test_a_sweep_has_all_combinations(results):
     sweep = results["sweep"]
-    assert sweep.settings() == [
-        {"electrode_mm": e, "dielectric_mm": d} for e in (0.3, 0.4) for d in (0.4, 0.6)
-    ]  # fmt: skip
+    assert sweep.settings() == [{"electrode_mm": e, "dielectric_mm": d} for e in (0.3, 0.4) for d in (0.4, 0.6)]
     pf = [point.prediction.drawn.capacitance.value * 1e12 for point in sweep.results]
     plate = [8.8541878128 * 4.68 * 1000e-6 / (d * 1e-3) for d in (0.4, 0.6)]  # eps0 eps A / d [pF]
     assert pf == pytest.approx([*plate, *plate], rel=1e-6)
@@ -119,14 +117,10 @@ def test_libraries_that_are_missing_are_named(results, monkeypatch):
     [
         ({"shape": "tri", "dielectric_mm": 0.2}, "dielectric_mm is a parameter; expected parameters: {dielectric_mm:"),
         ({"shape": "tri", "qualty": "fine"}, "unknown key 'qualty'; did you mean 'quality'"),
-        ({"shape": "tri", "materials": {"filn": "x60"}}, "did you mean 'film'"),
-        ({"shape": "tri", "quality": 3}, "quality is 3; expected text"),
-        ({"shape": "tri", "parameters": {"periodd_mm": 4}}, "parameter of tri 'periodd_mm'; did you mean 'period_mm'"),
         ({"shape": "trii"}, "did you mean 'tri'"),
-        ({"shape": "tri", "parameters": {"period_mm": -1}}, "period_mm is -1; expected a number from"),
-        ({}, "shape is missing"),
+        ({"shape": "tri", "quality": 3}, "quality is 3; expected text"),
     ],
-)  # fmt: skip
+)
 def test_wrong_names_are_refused_when_a_design_is_made(wrong, message):
     with pytest.raises(SensorgenError, match=re.escape(message)):
         sg.Design(**wrong)

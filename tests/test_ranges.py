@@ -1,8 +1,9 @@
 """Ranges of what is not known: values of one source or none, leads, contacts, the edge, and what narrows them."""
 
 from dataclasses import replace
-from math import exp, inf, isclose, log, pi, sqrt
+from math import exp, inf, log, pi, sqrt
 from statistics import mean
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -92,9 +93,8 @@ def test_hardness_bounds_a_modulus():
     for name in ("x60", "etpu", "filaflex-82a", "filaflex-conductive", "etpu-95-250"):
         material = materials.load(name)
         without = material.model_copy(update={"properties": material.properties | {"youngs_modulus_pa": []}})
-        low, high = spread(
-            type("D", (), {"material": lambda _, __, m=without: m})(), material_value(without, "", "youngs_modulus_pa")
-        )
+        design = SimpleNamespace(material=lambda _, of=without: of)
+        low, high = spread(design, material_value(without, "", "youngs_modulus_pa"))
         assert low < material.value("youngs_modulus_pa").value < high
 
 
@@ -127,9 +127,7 @@ def test_leads_are_a_two_port_in_front_of_the_line():
     z = sensor.impedance(tones, force, place)
     for k, f in enumerate(tones):
         a, b, c, d = (np.array([[1, 120.0], [0, 1]]) @ np.array([[1, 0], [2j * pi * f * 3e-12, 1]])).ravel()
-        assert isclose(
-            abs(led.impedance(tones, force, place)[k] / ((a * z[k] + b) / (c * z[k] + d)) - 1), 0, abs_tol=1e-12
-        )
+        assert abs(led.impedance(tones, force, place)[k] / ((a * z[k] + b) / (c * z[k] + d)) - 1) < 1e-12
     by_force = (led.impedance(tones, force + 1e-4, place) - led.impedance(tones, force - 1e-4, place)) / 2e-4
     assert led.response(tones, force, place).by_force_ohm_per_n == pytest.approx(by_force, rel=1e-6)
 
@@ -159,9 +157,8 @@ def test_a_wide_range_names_the_measurement_that_narrows_it(tmp_path):
     assert said["top electrode"].measurement == MULTIMETER
     assert said["top electrode"].factor == pytest.approx(wide.resistance["top"].upper / wide.resistance["top"].lower)
     assert all(n.factor > WIDE and n.left < n.factor for n in said.values())
-    known = own(
-        tmp_path, True, "resistivity_ohm_m: [{value: 0.07, source: lab, default: true, low: 0.0695, high: 0.0705}]"
-    )
+    read = "{value: 0.07, source: lab, default: true, low: 0.0695, high: 0.0705}"
+    known = own(tmp_path, True, f"resistivity_ohm_m: [{read}]")
     data = known.model_dump(exclude_defaults=True, mode="json") | {"leads": {"resistance_ohm": 0.0}}
     found = evaluate(bodies.drawn(make(data, str(tmp_path / "d.yaml"))))
     top = found.resistance["top"]
@@ -180,9 +177,8 @@ def test_first_screen_has_the_figures_of_a_bench():
     found = evaluate(bodies.drawn(make({"shape": "tri"})))
     force, place = found.bench()
     known = found.identifiability.calibrated
-    assert (force.value, place.value) == pytest.approx(
-        (known.sigma_force_n, known.sigma_position_m), rel=0.01
-    )  # of the worst top
+    of_the_worst_top = (known.sigma_force_n, known.sigma_position_m)
+    assert (force.value, place.value) == pytest.approx(of_the_worst_top, rel=0.01)
     alone = found.force_resolution.upper / found.force_resolution.value
     assert alone <= force.upper / force.value < 1.5 * alone  # the range holds all tops
 

@@ -19,7 +19,7 @@ from sensorgen.workflows.optimise.target import Target
 TEMPLATES = Path(packs.__file__).parent / "templates"
 OF_PYDANTIC = re.compile(
     r"[Ii]nput should|valid (number|string|dictionary|list|integer|tuple|boolean)|function-after|literal\[|dict\[|"
-    r"list\[|tuple\[|union\[|NoneType|validation error|pydantic|Range\b|Near\b",
+    r"list\[|tuple\[|union\[|NoneType|validation error|pydantic|Range\b|Near\b"
 )
 WRONG = [None, True, 5, -1e9, float("inf"), float("nan"), "x", "5", [], [1], ["x", None], {}, {"a": 1}, [[1]], [{}]]
 TARGET = {"design": "a", "parameters": {"x": [1]}, "objectives": {"capacitance_pf": "maximise"}}
@@ -101,11 +101,8 @@ def test_no_message_is_in_the_words_of_the_library(what, every):
 
 
 def test_damaged_facts_of_a_recording():
-    for text, message in (
-        ("{", "all of it is '{'; expected JSON"),
-        ("[]", "expected a mapping"),
-        ('{"lockins": 5}', "lockins is 5"),
-    ):
+    wrong = {"{": "all of it is '{'; expected JSON", "[]": "expected a mapping", '{"lockins": 5}': "lockins is 5"}
+    for text, message in wrong.items():
         with pytest.raises(BadInput, match="the facts of a recording are damaged: ") as caught:
             bench.from_json(text)
         assert message in str(caught.value)

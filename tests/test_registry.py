@@ -4,28 +4,9 @@ import pytest
 
 from sensorgen import models
 from sensorgen.core import lazy as registry
-from sensorgen.core.errors import BadInput, UnknownName, Unprintable
+from sensorgen.core.errors import UnknownName, Unprintable
 from sensorgen.core.findings import Finding
 from sensorgen.design import shapes
-
-
-def test_names_are_those_of_the_files():
-    own = [
-        "bump",
-        "cog",
-        "cone",
-        "double",
-        "double_tri",
-        "gaps",
-        "pillar",
-        "porous",
-        "pyramid",
-        "rect",
-        "reference",
-        "tri",
-    ]
-    assert registry.names(shapes) == own
-    assert "columns" in registry.names(models)
 
 
 @pytest.mark.parametrize("name", registry.names(shapes))
@@ -53,11 +34,6 @@ def test_the_nearest_name_is_offered(given, said):
 
 def test_a_long_wrong_name_is_cut():
     assert len(str(UnknownName("shape", "x" * 100_000, ["tri"]))) < 200
-
-
-def test_within_leads_the_message():
-    assert str(BadInput("what").within("f.yaml")) == "f.yaml: what"
-    assert str(BadInput("what").within("")) == "what"
 
 
 def test_unprintable_names_its_first_finding_that_stands():

@@ -29,16 +29,14 @@ def test_tri_has_the_volume_shares_of_the_spec(along, periods):
         size = {"length_mm": size["width_mm"], "width_mm": size["length_mm"]}
     got = volumes(tri.scene(tri.Params(**size, along=along, dielectric_mm=0.1), SUPPORTED))
     depth, floor = 7.0, 2.0 * periods * 7.0
-    assert got == pytest.approx(
-        {
-            "bottom_electrode": 0.3 * floor,
-            "film_and_lower": 0.1 * floor + 2 * 0.12 * periods * depth,
-            "support": 0.26 * periods * depth,
-            "hanging_dielectric": 0.25 * periods * depth,
-            "top_electrode_with_cogs": 0.3 * floor + 0.25 * periods * depth,
-        },
-        rel=1e-12,
-    )
+    cells = periods * depth
+    electrodes = {"bottom_electrode": 0.3 * floor, "top_electrode_with_cogs": 0.3 * floor + 0.25 * cells}
+    between = {
+        "film_and_lower": 0.1 * floor + 0.24 * cells,
+        "support": 0.26 * cells,
+        "hanging_dielectric": 0.25 * cells,
+    }
+    assert got == pytest.approx(electrodes | between, rel=1e-12)
 
 
 # Volumes per mm2 of sensor: geometry.md, "Not everything fits".
@@ -53,9 +51,8 @@ def test_rect_has_the_volumes_of_the_spec(along):
 
 def test_plate_is_three_plates():
     got = volumes(reference.scene(reference.Params(isolation_mm=0.1), Fill()))
-    assert got == pytest.approx(
-        {"bottom_electrode": 300.0, "dielectric": 600.0, "top_electrode": 300.0, "isolation": 100.0}, rel=1e-12
-    )
+    plates = {"bottom_electrode": 300.0, "dielectric": 600.0, "top_electrode": 300.0, "isolation": 100.0}
+    assert got == pytest.approx(plates, rel=1e-12)
 
 
 # By hand: the part of the default profile that lies left of a cut, in mm2 (tan gamma = 1, tan theta = 0.48).
@@ -111,9 +108,8 @@ def test_half_a_turn_about_x_keeps_x_and_turns_y_and_z(axis):
     (turned,) = Scene((Body("skew", "x60", (prism,)),), (9.0, 8.0, 7.0)).turned_over().bodies[0].pieces
 
     def corners(p: Prism) -> set[tuple[float, ...]]:
-        places = (
-            {p.axis: at} | dict(zip(PLANE[p.axis], c, strict=True)) for c in p.outline for at in (p.start_mm, p.end_mm)
-        )
+        ends = (p.start_mm, p.end_mm)
+        places = ({p.axis: at} | dict(zip(PLANE[p.axis], c, strict=True)) for c in p.outline for at in ends)
         return {tuple(place[a] for a in "xyz") for place in places}
 
     assert corners(turned) == {(x, 8.0 - y, 7.0 - z) for x, y, z in corners(prism)}
@@ -193,12 +189,10 @@ def test_the_areas_of_the_cuts_integrate_to_the_volume(axis, along):
     prism = Prism(along, ((0, 0), (4, 0), (3, 1), (2, 0.2), (1, 1)), 0.5, 2.0)
     ends = sorted({0.5, 2.0} if axis == along else {p[PLANE[along].index(axis)] for p in prism.outline})
     node = 0.5 / np.sqrt(3)
-    got = sum(
-        (b - a) / 2 * area_mm2(outline)
-        for a, b in pairwise(ends)
-        for at in ((a + b) / 2 - node * (b - a), (a + b) / 2 + node * (b - a))
-        for outline in prism.cut(axis, at)
-    )
+    got = 0.0
+    for a, b in pairwise(ends):
+        for at in ((a + b) / 2 - node * (b - a), (a + b) / 2 + node * (b - a)):
+            got += (b - a) / 2 * sum(map(area_mm2, prism.cut(axis, at)))
     assert got == pytest.approx(prism.volume_mm3(), rel=1e-14)
 
 
@@ -221,11 +215,6 @@ def test_less_than_a_nanometre_is_no_geometry(end, left):
     assert bool(clipped(((0.0, 0.0), (2.0, 0.0), (1.0, 1.0)), end)) is left
 
 
-def test_area_has_the_sign_of_the_turn():
-    assert area_mm2(((0, 0), (2, 0), (2, 3), (0, 3))) == 6
-    assert area_mm2(((0, 0), (0, 3), (2, 3), (2, 0))) == -6
-
-
 @pytest.mark.parametrize("along", ["x", "y"])
 def test_what_is_shorter_than_its_pattern_has_no_empty_bodies(along):
     """Half a period holds one cog, and no hanging dielectric."""
@@ -235,11 +224,6 @@ def test_what_is_shorter_than_its_pattern_has_no_empty_bodies(along):
 
 def test_a_scene_leaves_out_empty_bodies():
     assert Scene((Body("film", "x60", ()),), (1, 1, 1)).bodies == ()
-
-
-def test_a_body_is_found_by_its_name():
-    scene = Scene((Body("film", "x60", (box(0, 1, 0, 1, 0, 1),)),), (1, 1, 1))
-    assert scene.body("film").volume_mm3() == 1
 
 
 @pytest.mark.parametrize("axis", "xyz")

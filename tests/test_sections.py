@@ -36,13 +36,8 @@ def test_layers_of_the_columns_are_the_volumes(scene):
         return (column.right_mm - column.left_mm) * sum(heights) / 2
 
     for body in scene.bodies:
-        total = sum(
-            s.depth_mm * area(c, layer)
-            for s in sections(scene)
-            for c in columns(s)
-            for layer in c.layers
-            if layer.body.name == body.name
-        )
+        parts = ((s, c, layer) for s in sections(scene) for c in columns(s) for layer in c.layers)
+        total = sum(s.depth_mm * area(c, layer) for s, c, layer in parts if layer.body.name == body.name)
         assert total == pytest.approx(body.volume_mm3(), rel=1e-9)
 
 

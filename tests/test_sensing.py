@@ -56,10 +56,6 @@ def test_other_cells_are_taken_for_free_plates_and_that_is_said(shape, rest):
     assert "was not solved" in found.doubts[0]
 
 
-def test_a_law_that_is_asked_for_is_taken():
-    assert sensed("tri", "unconfined").sensor.compression.name == "unconfined"
-
-
 def test_what_cannot_be_is_refused():
     with pytest.raises(OutOfRange, match="applies to a solid plate; tri has gaps"):
         sensed("tri", "bonded")

@@ -25,12 +25,6 @@ def test_the_plate_of_the_thesis_tells_neither_force_nor_position():
     assert (bonded.sigma_force_n, bonded.sigma_position_m) == pytest.approx((214, 21), rel=2e-2)
 
 
-def test_the_designs_own_resistivity_unless_given():
-    own = sensitivity(PLATE, compression.unconfined(6e6), TONES_HZ, 6.0)
-    same = sensitivity(PLATE, compression.unconfined(6e6), TONES_HZ, 6.0, resistivity_ohm_m=0.042)
-    assert own.sigma_position_m == pytest.approx(same.sigma_position_m, rel=1e-9)
-
-
 @pytest.mark.parametrize("held", BOUNDARIES)
 def test_a_plate_gives_way_as_its_three_layers_do(held):
     """Free: they widen alike. Bonded without end: by the modulus of uniaxial strain."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
+from line_cases import PLATE as LINE_PLATE
 from line_cases import TONES, exact
 
 from sensorgen.core.errors import OutOfRange
@@ -20,28 +21,15 @@ TRI = replace(PLATE, compression=compression.solved("tri", SQUARES, {"x60": 6e6,
 TONE = np.array(TONES)
 
 
-def plate_inputs(force, position):
+def plate_inputs(force, position, hertz=99.7e3):
     """The plate of PLATE for the line, its tip clipped by hand; numbers may be mpmath's."""
     left, right = max(position - 0.005, 0), min(position + 0.005, 0.1)
-    return {
-        "length_m": 0.1,
-        "width_m": 0.01,
-        "top_thickness_m": 3e-4,
-        "bottom_thickness_m": 3e-4,
-        "top_resistivity_ohm_m": 0.07,
-        "bottom_resistivity_ohm_m": 0.2,
-        "film_m": 6e-4,
-        "eps_r": 4.68,
-        "modulus_pa": 6e6,
-        "force_n": force,
-        "left_m": left,
-        "tip_m": right - left,
-    }
+    return LINE_PLATE | {"force_n": force, "left_m": left, "tip_m": right - left, "frequency_hz": hertz}
 
 
 @pytest.mark.parametrize("position", [0.0, 0.002, 0.05, 0.0976, 0.1])
 def test_the_plate_is_the_lines_own(position):
-    expected = line.impedance(line.PressedLine(**plate_inputs(3.0, position), frequency_hz=TONE))
+    expected = line.impedance(line.PressedLine(**plate_inputs(3.0, position, TONE)))
     found = PLATE.impedance(TONE, 3.0, position)
     assert found.real == pytest.approx(expected.real, rel=1e-11)
     assert found.imag == pytest.approx(expected.imag, rel=1e-13)
@@ -53,12 +41,8 @@ def test_slopes_against_mpmath(force, position):
     """Also where the tip overhangs, and the patch's length moves with it."""
     found = PLATE.response(99.7e3, force, position)
     with mpmath.workdps(50):
-        by_force = mpmath.diff(
-            lambda f: exact(digits=200, **plate_inputs(f, mpmath.mpf(position)), frequency_hz=99.7e3), force
-        )
-        by_position = mpmath.diff(
-            lambda x: exact(digits=200, **plate_inputs(force, x), frequency_hz=99.7e3), mpmath.mpf(position)
-        )
+        by_force = mpmath.diff(lambda f: exact(digits=200, **plate_inputs(f, mpmath.mpf(position))), force)
+        by_position = mpmath.diff(lambda x: exact(digits=200, **plate_inputs(force, x)), mpmath.mpf(position))
     assert complex(found.by_force_ohm_per_n) == pytest.approx(complex(by_force), rel=1e-8, abs=1e-9)
     assert complex(found.by_position_ohm_per_m) == pytest.approx(complex(by_position), rel=1e-8, abs=1e-6)
 

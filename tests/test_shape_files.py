@@ -2,6 +2,8 @@
 
 import os
 import re
+import signal
+import subprocess
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -76,11 +78,9 @@ def test_a_shapes_own_refusal_keeps_its_words():
 
 
 def test_it_runs_once_for_each_set_of_parameters(monkeypatch):
-    asked = []
-    ask = shape_files._ShapeProcess.ask
-    monkeypatch.setattr(
-        shape_files._ShapeProcess, "ask", lambda self, question: asked.append(question) or ask(self, question)
-    )
+    asked, process = [], shape_files._ShapeProcess
+    ask = process.ask
+    monkeypatch.setattr(process, "ask", lambda self, question: asked.append(question) or ask(self, question))
     text = TEMPLATE + "\n# once\n"
     for _ in range(3):
         shape_files._foreign.cache_clear()
@@ -187,11 +187,7 @@ WRONG = [
     ("@dataclass(frozen=True)", "@staticmethod", "AttributeError|TypeError|no dataclass|has no"),
     ("return self.length_mm / self.period_mm", "return -1", "cells.. is -1; expected a number above 0"),
     ("return self.length_mm / self.period_mm", "return 'many'", "cells.. is 'many'; expected a number above 0"),
-    (
-        '"range": (0.05, 5.0)})\n    film',
-        '"range": (0, 10**400)})\n    film',
-        "parameter height_mm has no range; write",
-    ),
+    ('"range": (0.05, 5.0)})\n    film', '"range": (0, 10**400)})\n    film', "parameter height_mm has no range;"),
     ('"range": (0.5, 50.0)', '"choices": ("4", "4\\x1b[2J")', "is not among its choices, or one cannot be printed"),
     ("return self.length_mm / self.period_mm", "return 1e30", "1e.30 cells of the pattern"),
 ]
@@ -214,9 +210,6 @@ def test_its_process_ends_with_this_one():
     """An endless shape of a process that was killed."""
     if not sys.platform.startswith("linux"):
         pytest.skip("the system does not end it there")
-    import signal
-    import subprocess
-
     code = (
         "import sys; from sensorgen.design import shape_files\n"
         "shape_files.trust('zig', sys.argv[1])\n"

@@ -8,7 +8,6 @@ import uuid
 from pathlib import Path
 from xml.etree import ElementTree
 
-import extruded
 import pytest
 
 from sensorgen.core import yamlfile
@@ -30,10 +29,8 @@ both_qualities = pytest.mark.parametrize("quality", [load_quality(n) for n in qu
 
 def usual(printer: Printer, **override: object) -> dict[int, ToolLoad]:
     """Electrodes and dielectric on the printer's usual tools; ``override`` is for the dielectric."""
-    return {
-        printer.default_tools["etpu"]: ToolLoad(materials.load("etpu")),
-        printer.default_tools["x60"]: ToolLoad(materials.load("x60"), **override),
-    }
+    tools, etpu, x60 = printer.default_tools, materials.load("etpu"), materials.load("x60")
+    return {tools["etpu"]: ToolLoad(etpu), tools["x60"]: ToolLoad(x60, **override)}
 
 
 def changed(name: str, **prints: float) -> materials.Material:
@@ -90,13 +87,10 @@ def test_missing_print_value_is_named_with_its_tool():
         ({6: ToolLoad(materials.load("etpu"))}, BadInput, r"no tool 6; its tools are \[1, 2, 3, 4, 5\]"),
         ({3: ToolLoad(materials.load("etpu"), infill_percent=0)}, OutOfRange, r"infill \[%\] is 0; expected 1 to 100"),
         ({3: ToolLoad(materials.load("etpu"), infill_pattern="gird")}, UnknownName, "did you mean 'grid'"),
-        (
-            {3: ToolLoad(materials.load("etpu")), 4: ToolLoad(changed("x60", bed_temperature_c=60.0))},
-            BadInput,
-            "one bed, two temperatures: etpu on tool 3 75 C, x60 on tool 4 60 C",
-        ),
+        ({3: ToolLoad(materials.load("etpu")), 4: ToolLoad(changed("x60", bed_temperature_c=60.0))},
+         BadInput, "one bed, two temperatures: etpu on tool 3 75 C, x60 on tool 4 60 C"),
     ],
-)
+)  # fmt: skip
 def test_impossible_loads_are_refused(loads, error, says):
     with pytest.raises(error, match=says):
         cura.profiles(DIABASE, FINE, loads)
@@ -136,8 +130,7 @@ def test_prusa_unused_tools_are_named_so_and_stay_cold():
 
 
 @pytest.mark.parametrize(
-    ("name", "shape"),
-    [("diabase-h5", "-195x-85,195x-85,195x85,-195x85"), ("prusa-xl5", "0x0,360x0,360x360,0x360")],
+    ("name", "shape"), [("diabase-h5", "-195x-85,195x-85,195x85,-195x85"), ("prusa-xl5", "0x0,360x0,360x360,0x360")]
 )
 def test_prusa_bed_lies_where_the_printer_has_its_origin(name, shape):
     printer = load_printer(name)
@@ -151,13 +144,8 @@ def test_prusa_start_gcode_stays_on_one_line():
 
 def test_prusa_nothing_changes_the_drawing():
     found = ini(prusa.profile(DIABASE, FINE, usual(DIABASE)))
-    for key in (
-        "thick_bridges",
-        "elefant_foot_compensation",
-        "xy_size_compensation",
-        "raft_layers",
-        "support_material",
-    ):
+    compensations = ("elefant_foot_compensation", "xy_size_compensation")
+    for key in ("thick_bridges", *compensations, "raft_layers", "support_material"):
         assert found[key] == "0", key
     assert found["perimeter_generator"] == "arachne"
 
@@ -181,9 +169,9 @@ def test_two_tools_and_one_tool_are_enough():
     assert ini(prusa.profile(two, FINE, usual(two)))["temperature"] == "230,210"
     alone = prusa.profile(two, FINE, {9: ToolLoad(materials.load("etpu"))})
     assert (ini(alone)["temperature"], ini(alone)["wipe_tower"]) == ("0,210", "0")
-    assert json.loads(cura.profiles(two, FINE, usual(two))["definitions/diabase-h5.def.json"])["metadata"][
-        "machine_extruder_trains"
-    ] == {"0": "diabase-h5_extruder_0", "1": "diabase-h5_extruder_1"}
+    machine = json.loads(cura.profiles(two, FINE, usual(two))["definitions/diabase-h5.def.json"])
+    trains = {"0": "diabase-h5_extruder_0", "1": "diabase-h5_extruder_1"}
+    assert machine["metadata"]["machine_extruder_trains"] == trains
 
 
 # --- Cura -------------------------------------------------------------------------------------------------
@@ -227,10 +215,8 @@ def test_cura_density_that_no_source_gives_is_left_out():
 
 
 def test_cura_keeps_two_infills_of_one_material_apart():
-    loads = {
-        3: ToolLoad(materials.load("x60")),
-        4: ToolLoad(materials.load("x60"), infill_percent=80.0, infill_pattern="grid"),
-    }
+    x60 = materials.load("x60")
+    loads = {3: ToolLoad(x60), 4: ToolLoad(x60, infill_percent=80.0, infill_pattern="grid")}
     own = "quality/diabase-h5/diabase-h5_fine_sensorgen_x60"
     files = cura.profiles(DIABASE, FINE, loads)
     assert values(files[f"{own}.inst.cfg"])["infill_sparse_density"] == "100"
@@ -260,14 +246,8 @@ def test_profiles_are_the_same_each_time_and_without_leftovers(printer, quality)
 
 
 def test_a_version_renames_drops_adds_and_translates():
-    change = versions.VersionChange(
-        title="2",
-        source="here",
-        dropped=("a",),
-        renamed={"b": "c"},
-        values={"b": {"False": "x"}},
-        added={"t": "e = 5\n"},
-    )
+    changes = {"renamed": {"b": "c"}, "values": {"b": {"False": "x"}}, "added": {"t": "e = 5\n"}}
+    change = versions.VersionChange(title="2", source="here", dropped=("a",), **changes)
     text = "# a = 1\n[values]\na = 1\nb = False\nbb = False\nd = {{ b }}\n"
     assert change.adapted("t", text) == "# a = 1\n[values]\nc = x\nbb = False\nd = {{ b }}\ne = 5\n"
     assert change.adapted("another", "b = True\n") == "c = True\n"
@@ -275,9 +255,8 @@ def test_a_version_renames_drops_adds_and_translates():
 
 @pytest.mark.parametrize("slicer", ["prusa", "cura"])
 def test_what_a_version_drops_or_renames_is_there_before(slicer):
-    names = (
-        ("profile.ini",) if slicer == "prusa" else ("quality_global.inst.cfg", "quality_tool.inst.cfg", "engine.ini")
-    )
+    of = {"prusa": ("profile.ini",), "cura": ("quality_global.inst.cfg", "quality_tool.inst.cfg", "engine.ini")}
+    names = of[slicer]
     before: tuple[int, ...] = ()
     for version, change in versions.changes(slicer).items():
         old = [line.partition(" =") for name in names for line in versions.template(slicer, before, name).splitlines()]
@@ -289,10 +268,9 @@ def test_what_a_version_drops_or_renames_is_there_before(slicer):
 
 
 def test_the_profile_is_that_of_the_version():
-    keys = {
-        version: ini(prusa.profile(DIABASE, FINE, usual(DIABASE), versions.parse(version)))
-        for version in ("2.5.2", "2.6.0", "2.7.4", "2.8.1", "2.9.2", "3.0")
-    }
+    keys = {}
+    for version in ("2.5.2", "2.6.0", "2.7.4", "2.8.1", "2.9.2", "3.0"):
+        keys[version] = ini(prusa.profile(DIABASE, FINE, usual(DIABASE), versions.parse(version)))
     assert keys["2.5.2"] == ini(prusa.profile(DIABASE, FINE, usual(DIABASE)))
     assert [v for v, k in keys.items() if "wipe_tower_x" in k] == ["2.5.2", "2.6.0", "2.7.4", "2.8.1"]
     assert [v for v, k in keys.items() if "wiping_volumes_extruders" in k] == ["2.5.2", "2.6.0"]
@@ -340,9 +318,8 @@ def test_orca_presets_belong_together_and_say_what_prusaslicers_profile_says():
     assert process["min_bead_width"] == same["min_bead_width"]
     assert [each["nozzle_temperature"][0] for each in filaments] == same["temperature"].split(",")[2:4]
     assert [each["hot_plate_temp"][0] for each in filaments] == same["bed_temperature"].split(",")[2:4]
-    assert [each["filament_max_volumetric_speed"][0] for each in filaments] == (
-        same["filament_max_volumetric_speed"].split(",")[2:4]
-    )
+    speeds = same["filament_max_volumetric_speed"].split(",")[2:4]
+    assert [each["filament_max_volumetric_speed"][0] for each in filaments] == speeds
 
 
 # --- tower ------------------------------------------------------------------------------------------------
@@ -359,68 +336,6 @@ def test_tower_stands_on_the_bed_and_holds_what_is_primed(printer, quality, tool
     assert math.pi / 4 * place.side_mm**2 * quality.layer_mm >= tools * 15.0
 
 
-# --- reading G-code ---------------------------------------------------------------------------------------
-
-
-def mm(found: extruded.Extruded) -> dict[tuple[int, str], float]:
-    """Lengths instead of volumes: the filament of these tests has a section of 1 mm2."""
-    return {key: round(volume, 9) for key, volume in found.volume_mm3.items()}
-
-
-SECTION_OF_ONE = 2 / math.sqrt(math.pi)
-
-
-def test_reading_relative_with_retraction_over_a_tool_change():
-    lines = [
-        "M83",
-        "T1 ; first",
-        ";TYPE:Perimeter",
-        "G1 X1 E2",
-        "G1 E-3 F900",
-        "T0",
-        "G1 X2 E5",
-        "T1",
-        "G1 E3",
-        "G1 X3 E.5",
-    ]
-    found = extruded.read(lines, SECTION_OF_ONE)
-    assert found.tools == (1, 0, 1)
-    assert mm(found) == {(1, "perimeter"): 2.5, (0, "perimeter"): 5.0}
-
-
-def test_reading_absolute_with_resets():
-    lines = ["M82", "T0", "G92 E0", "G1 X1 E2", "G1 E1.5", "G1 X9 E2.5", "G92 E0.0", "G1 X3 E1", "G1 X4"]
-    assert mm(extruded.read(lines, SECTION_OF_ONE)) == {(0, ""): 3.5}
-
-
-def test_reading_counts_what_goes_beyond_a_retraction():
-    assert mm(extruded.read(["M83", "G1 E-1", "G1 E1.25"], SECTION_OF_ONE)) == {(0, ""): 0.25}
-
-
-def test_reading_is_not_fooled_by_comments_and_parameters():
-    lines = ["; T4", "M83 ; E9", "M104 T3 S210", "G10 P3 S210", "(T2)", "T-1", "T3", "T3", "m106 s255", "g1 x1 e1 ; E5"]
-    found = extruded.read(lines, SECTION_OF_ONE)
-    assert found.tools == (3,)
-    assert mm(found) == {(3, ""): 1.0}
-
-
-def test_model_is_told_from_tower_and_skirt():
-    lines = [
-        "M83",
-        ";TYPE:SKIRT",
-        "G1 E1",
-        ";TYPE:WALL-OUTER",
-        "G1 E2",
-        ";TYPE:Wipe tower",
-        "G1 E4",
-        ";TYPE:Skirt/Brim",
-        "G1 E8",
-    ]
-    found = extruded.read(lines, SECTION_OF_ONE)
-    assert found.model_mm3() == {0: pytest.approx(2.0)}
-    assert found.total_mm3() == {0: pytest.approx(15.0)}
-
-
 # --- running ----------------------------------------------------------------------------------------------
 
 
@@ -435,11 +350,6 @@ def test_a_missing_slicer_says_how_to_get_it(monkeypatch, tmp_path):
 
 def python(code: str) -> list[str]:
     return [sys.executable, "-c", code]
-
-
-def test_a_failing_slicer_is_quoted(tmp_path):
-    with pytest.raises(SlicerFailed, match="exit code 3: Error: no such wall"):
-        run(python("print('licence'); print('Error: no such wall'); raise SystemExit(3)"), tmp_path / "a.gcode")
 
 
 def test_an_old_result_is_not_taken_for_a_new_one(tmp_path: Path):

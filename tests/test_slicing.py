@@ -1,6 +1,8 @@
 """Plates to slicers that only seem so: what is handed over, what comes back, and what can go wrong."""
 
+import io
 import os
+import re
 import stat
 import subprocess
 import sys
@@ -65,9 +67,8 @@ WRITES = f"open(out, 'w').write('''{GCODE}''')"
 def test_a_plate_is_sliced_and_put_into_the_printers_words(slicer, tmp_path):
     slicer(WRITES)
     steps = []
-    made = sliced(
-        [Placed(SMALL, (-30.0, 5.0), "a"), Placed(OTHER, (30.0, 0.0), "b")], "prusa", tmp_path / "x", step=steps.append
-    )
+    pieces = [Placed(SMALL, (-30.0, 5.0), "a"), Placed(OTHER, (30.0, 0.0), "b")]
+    made = sliced(pieces, "prusa", tmp_path / "x", step=steps.append)
     assert (made.slicer, made.version) == ("prusa", "2.5.0")
     assert check(made.ready, SMALL.machine).errors() == []
     assert check(made.raw, SMALL.machine).errors()
@@ -110,9 +111,6 @@ def test_the_sensor_has_a_middle_of_its_own_beside_what_is_printed_with_it(extra
     ("family", "expected"), [("prusa", (-30.0, 5.0)), ("orca", (-30.0, 5.0)), ("cura", (165.0, 90.0))]
 )
 def test_a_plates_3mf_counts_as_its_family_does(family, expected, tmp_path):
-    import io
-    import re
-
     content = slicing.plate_3mf([Placed(SMALL, (-60.0, 5.0), "a"), Placed(SMALL, (0.0, 5.0), "b")], family, "two")
     model = zipfile.ZipFile(io.BytesIO(content)).read("3D/3dmodel.model").decode()
     shift = np.array(re.search(r'transform="([^"]*)"', model)[1].split()[9:], dtype=float)
@@ -136,10 +134,7 @@ def test_an_stl_has_its_triangles(tmp_path):
         ([Placed(SMALL, (0, 0), "a"), Placed(OTHER, (9, 0), "a")], "two pieces are called 'a'"),
         ([alone(SMALL), Placed(small(quality="extrafine"), (9, 0), "b")], "differ in quality"),
         ([alone(SMALL), Placed(small(printer="prusa-xl5"), (9, 0), "b")], "differ in printer"),
-        (
-            [alone(SMALL), Placed(small(infill={"x60": {"percent": 50.0}}), (9, 0), "b")],
-            "want tool 4 differently",
-        ),
+        ([alone(SMALL), Placed(small(infill={"x60": {"percent": 50.0}}), (9, 0), "b")], "want tool 4 differently"),
     ],
 )
 def test_a_plate_that_no_print_could_make(pieces, said, tmp_path):
@@ -255,9 +250,8 @@ def test_a_design_gets_its_file_and_what_was_found(copies, tmp_path):
     made = slice_design(OTHER, tmp_path / "out", "prusa", force=True)
     again = slice_design(OTHER, tmp_path / "out", "prusa", force=True)
     folder = tmp_path / "out" / OTHER.name
-    assert sorted(p.name for p in folder.iterdir()) == [
-        f"{OTHER.name}.prusa.{end}" for end in ("gcode", "gcode.json", "layers.html")
-    ]
+    names = [f"{OTHER.name}.prusa.{end}" for end in ("gcode", "gcode.json", "layers.html")]
+    assert sorted(p.name for p in folder.iterdir()) == names
     content = Path(made.gcode).read_bytes()
     assert made.sha256 == again.sha256 == sha256(content).hexdigest()
     assert content.endswith(b"M0 H1\n")

@@ -91,14 +91,6 @@ def test_what_to_do_instead(read, text, advice):
         read(text)
 
 
-@pytest.mark.parametrize(
-    ("read", "text"), [(force_n, "1kg"), (force_n, "1mm"), (frequency_hz, "1N"), (length_mm, "1N")]
-)
-def test_units_of_another_quantity(read, text):
-    with pytest.raises(BadInput, match=r"if you like$"):
-        read(text)
-
-
 def test_a_long_word_is_cut_in_the_message():
     with pytest.raises(BadInput) as caught:
         force_n("x" * 5000)

@@ -2,68 +2,56 @@
 
 import numpy as np
 import pytest
-from skfem import (
-    Basis,
-    BilinearForm,
-    ElementQuad2,
-    ElementVector,
-    FacetBasis,
-    LinearForm,
-    MeshQuad,
-    asm,
-    condense,
-    solve,
-)
+import skfem
 from skfem.helpers import ddot, sym_grad, trace
 from skfem.models.elasticity import lame_parameters
 
 from sensorgen.core.errors import BadInput
-from sensorgen.design.design import make
 from sensorgen.measure.virtual.array import nodal, printed
 from sensorgen.prediction.array.frames import PressureMaps, inverted
-from sensorgen.prediction.array.model import array_model
 from sensorgen.prediction.array.readout import ArrayReadout
 from sensorgen.prediction.array.study import study
 from sensorgen.solvers.cover import ElasticLayer, kernel, transfer
 
+from .conftest import array_of
+
 PITCH_M = 5e-3
-CELL = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
 
 
 def by_elements(layer, spring, squares=9, fine=12, thick=6):
     """Mean pressures on springs under each pitch, for 1 Pa on the middle one."""
     half = squares * PITCH_M / 2
-    mesh = MeshQuad.init_tensor(
+    mesh = skfem.MeshQuad.init_tensor(
         np.linspace(-half, half, squares * fine + 1), np.linspace(0, layer.thickness_m, thick + 1)
     )
-    basis = Basis(mesh, ElementVector(ElementQuad2()))
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementQuad2()))
     lam, mu = lame_parameters(layer.youngs_modulus_pa, layer.poisson_ratio)
 
-    @BilinearForm
+    @skfem.BilinearForm
     def stress(u, v, w):
         return 2 * mu * ddot(sym_grad(u), sym_grad(v)) + lam * trace(sym_grad(u)) * trace(sym_grad(v))
 
-    @BilinearForm
+    @skfem.BilinearForm
     def springs(u, v, w):
         return spring * u[1] * v[1]
 
-    @LinearForm
+    @skfem.LinearForm
     def load(v, w):
         return -1.0 * (np.abs(w.x[0]) < PITCH_M / 2) * v[1]
 
-    low, high = (FacetBasis(mesh, basis.elem, facets=mesh.facets_satisfying(lambda x, z=z: np.isclose(x[1], z)))
+    low, high = (skfem.FacetBasis(mesh, basis.elem, facets=mesh.facets_satisfying(lambda x, z=z: np.isclose(x[1], z)))
                  for z in (0.0, layer.thickness_m))  # fmt: skip
     fixed = basis.get_dofs(lambda x: np.isclose(x[0], 0) & np.isclose(x[1], 0)).all("u^1")
-    u = solve(*condense(asm(stress, basis) + asm(springs, low), asm(load, high), D=fixed))
+    u = skfem.solve(*skfem.condense(skfem.asm(stress, basis) + skfem.asm(springs, low), skfem.asm(load, high), D=fixed))
 
     def mean(k):
         left = -half + k * PITCH_M
 
-        @LinearForm
+        @skfem.LinearForm
         def over(v, w):
             return -spring * v[1] * ((w.x[0] > left) & (w.x[0] < left + PITCH_M)) / PITCH_M
 
-        return float(asm(over, low) @ u)
+        return float(skfem.asm(over, low) @ u)
 
     return np.array([mean(k) for k in range(squares)])
 
@@ -97,9 +85,7 @@ def test_two_loose_plates_bend_as_the_sum_of_both():
 
 @pytest.fixture(scope="module")
 def model():
-    sheet = {"cover_mm": 1.0, "cover_mpa": 300.0}
-    return array_model(make({"shape": "array", "name": "a", "cell": CELL,
-                             "parameters": {"length_mm": 60, "width_mm": 50, "between": "air"} | sheet}))  # fmt: skip
+    return array_of({"length_mm": 60, "width_mm": 50, "cover_mm": 1.0, "cover_mpa": 300.0})
 
 
 def test_a_press_under_a_sheet_comes_back(model):
@@ -117,18 +103,14 @@ def test_a_press_under_a_sheet_comes_back(model):
     assert (under.on_surface().sigma_kpa >= under.sigma_kpa).all()
 
 
-def test_a_sheet_that_spreads_beyond_the_array_is_named(model):
-    data = model.design.model_dump(exclude_defaults=True)
-    plate = array_model(make({**data, "parameters": data["parameters"] | {"cover_mm": 30, "cover_mpa": 1e5}}))
-    with pytest.raises(
-        BadInput, match="cover_mm 30 of cover_mpa 100000: it spreads a press over more than 16 crossings"
-    ):
+def test_a_sheet_that_spreads_beyond_the_array_is_named():
+    plate = array_of({"length_mm": 60, "width_mm": 50, "cover_mm": 30, "cover_mpa": 1e5})
+    with pytest.raises(BadInput, match="cover_mm 30 of cover_mpa 100000: it spreads a press over more than 16 cross"):
         study(plate, ArrayReadout())
 
 
 def test_resolution_on_the_surface_is_worse(model):
-    bare = array_model(make({**model.design.model_dump(exclude_defaults=True), "parameters": {
-        "length_mm": 60, "width_mm": 50, "between": "air", "cover_mm": 0.0}}))  # fmt: skip
+    bare = array_of({"length_mm": 60, "width_mm": 50, "cover_mm": 0.0})
     sheet, none = (study(of, ArrayReadout()) for of in (model, bare))
     assert np.median(sheet.sigma_kpa) > 1.1 * np.median(none.sigma_kpa)
     text = "\n".join(str(part) for _, part in sheet._facts())

@@ -4,8 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.sparse import coo_array, diags_array
-from scipy.sparse.linalg import cg, spsolve
+from resistors import potentials, sides
 
 from sensorgen.prediction.array.model import CrossingSection, fringe
 
@@ -34,35 +33,14 @@ def graded(*ends, least=0.05, most=0.6):
 
 def charges(faces, eps, held):
     """Charge of each conductor, by cells' permittivities and conductors' potentials (nan: none); walls without flux."""
-    size = [np.diff(each) for each in faces]
-    index = np.arange(eps.size).reshape(eps.shape)
-    is_held = np.isfinite(held)
-    rows, columns, values = [], [], []
+    wide, edges = np.meshgrid(*map(np.diff, faces), indexing="ij"), []
+    volume = np.prod(wide, axis=0)
+    number = np.arange(eps.size).reshape(eps.shape)
     for axis in range(3):
-        width = size[axis].reshape([-1 if k == axis else 1 for k in range(3)])
-        across = np.multiply.outer(np.multiply.outer(*[size[k] if k != axis else np.ones(1) for k in (0, 1)]), size[2]
-                                   if axis != 2 else np.ones(1))  # fmt: skip
-        half = np.where(is_held, 0.0, width / 2 / eps)
-        low, high = (np.take(half, range(a, half.shape[axis] + b), axis) for a, b in ((0, -1), (1, 0)))
-        one, other = (np.take(index, range(a, half.shape[axis] + b), axis) for a, b in ((0, -1), (1, 0)))
-        with np.errstate(divide="ignore"):
-            g = np.where(low + high > 0, across / (low + high), 0.0)
-        rows.append(one.ravel()), columns.append(other.ravel()), values.append(g.ravel())
-    i, j, g = (np.concatenate(each) for each in (rows, columns, values))
-    n = eps.size
-    off = coo_array((g, (i, j)), shape=(n, n)).tocsr()
-    off = off + off.T
-    matrix = (diags_array(off.sum(1)) - off).tocsr()
-    u = np.nan_to_num(held.ravel())
-    free = ~is_held.ravel()
-    right = -(matrix @ u)[free]
-    inner = matrix[free][:, free]
-    if eps.shape[1] == 1:
-        u[free] = spsolve(inner.tocsc(), right)
-    else:
-        u[free], info = cg(inner, right, rtol=1e-8, M=diags_array(1 / inner.diagonal()), maxiter=5000)
-        assert not info
-    return (matrix @ u).reshape(eps.shape)
+        half = np.where(np.isfinite(held), 0.0, wide[axis] / 2 / eps)
+        ohm, (area, _) = sum(sides(half, axis)), sides(volume / wide[axis], axis)
+        edges.append([of[ohm > 0] for of in (*sides(number, axis), area / np.where(ohm > 0, ohm, 1.0))])
+    return potentials(*map(np.concatenate, zip(*edges, strict=True)), held.ravel())[1].reshape(eps.shape)
 
 
 def solved(of, steps=0.05):

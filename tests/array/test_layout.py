@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from sensorgen.checks.review import review
-from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import make
 from sensorgen.design.values import resistivities
@@ -154,9 +154,7 @@ def test_findings_name_the_crossing():
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        ({"parameters": {"pitch_x_mm": 8, "column_mm": 8}}, "column_mm 8 leaves no space between columns"),
         ({"parameters": {"length_mm": 5}}, "room for 6 rows and 0 columns"),
-        ({"parameters": {"rows": 2.5}}, "rows is 2.5; expected a whole number"),
         ({"parameters": {"lead_mm": 3}}, "lead_mm 3 leaves no space between leads"),
         ({"parameters": {"length_mm": 600, "width_mm": 600, "pitch_x_mm": 5, "pitch_y_mm": 5, "row_mm": 4,
                          "column_mm": 4}}, "120 x 120 crossings; expected at most 10000"),
@@ -173,11 +171,6 @@ def test_findings_name_the_crossing():
 def test_no_array_is_an_error(data, words):
     with pytest.raises(SensorgenError, match=words):
         _ = make({"shape": "array"} | data).drawn
-
-
-def test_only_arrays_have_wires():
-    with pytest.raises(BadInput, match="has no crossings"):
-        wire_table(make({"shape": "tri"}))
 
 
 def test_lines_that_are_spread_evenly_need_no_whole_periods():

@@ -4,19 +4,17 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from sensorgen.design.design import make
 from sensorgen.measure.virtual.array import nodal
 from sensorgen.prediction.array.frames import at_rest
-from sensorgen.prediction.array.model import array_model
 from sensorgen.prediction.array.readout import ArrayReadout
 from sensorgen.prediction.array.study import PRESS_N, count, distance_mm, pressures, study
+
+from .conftest import array_of
 
 
 @pytest.fixture(scope="module")
 def model():
-    size = {"length_mm": 80, "width_mm": 60, "between": "air"}
-    cell = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
-    return array_model(make({"shape": "array", "name": "a", "parameters": size, "cell": cell}))
+    return array_of({"length_mm": 80, "width_mm": 60})
 
 
 def test_a_press_on_squares_has_its_force(model):

@@ -10,17 +10,14 @@ from sensorgen.design.design import load, make
 from sensorgen.prediction.array.frames import PressureMaps
 from sensorgen.prediction.array.model import array_model
 
-TRI = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
-SIZE = {"length_mm": 60, "width_mm": 50, "between": "air"}
+from .conftest import array_of
 
-
-def design(regions, **more):
-    return make({"shape": "array", "name": "a", "parameters": SIZE, "cell": TRI, "regions": regions, **more})
+SIZE = {"length_mm": 60, "width_mm": 50}
 
 
 @pytest.fixture(scope="module")
 def model():
-    return array_model(design({"left": [[0, 0], [20, 50]], "corner": [[40, 30], [60, 30], [60, 50]]}))
+    return array_of(SIZE, regions={"left": [[0, 0], [20, 50]], "corner": [[40, 30], [60, 30], [60, 50]]})
 
 
 def test_values_of_a_region_are_those_of_its_crossings(model):
@@ -73,11 +70,11 @@ CROSSED = [[0, 0], [9, 9], [0, 9], [9, 0]]
 @pytest.mark.parametrize("corners", [[], [[0, 0]], NO_AREA, [[70, 0], [90, 9]], CROSSED, [[0, 0, 1], [9, 9]]])
 def test_no_region_is_an_error(corners):
     with pytest.raises(BadInput, match=r"regions\.odd: no area with a crossing"):
-        _ = array_model(design({"odd": corners})).regions
+        _ = array_of(SIZE, regions={"odd": corners}).regions
 
 
 def test_regions_are_of_arrays_and_have_plain_names():
     with pytest.raises(BadInput, match="regions: tri has no crossings"):
         make({"shape": "tri", "regions": {"a": [[0, 0], [1, 1]]}})
     with pytest.raises(BadInput, match="regions"):
-        design({"../a": [[0, 0], [1, 1]]})
+        array_of(SIZE, regions={"../a": [[0, 0], [1, 1]]})

@@ -10,17 +10,9 @@ from insole_sessions import Insole
 from in_process import run
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.array_frames import refuse_swapped, session
+from sensorgen.measure.array_frames import session
 from sensorgen.prediction.array import sessions as calibration
-from sensorgen.prediction.array.elements import (
-    ArraySession,
-    LawForm,
-    Past,
-    behind,
-    doubtful_time,
-    flickering,
-    lagged,
-)
+from sensorgen.prediction.array.elements import ArraySession, LawForm, Past, behind, doubtful_time, flickering, lagged
 from sensorgen.prediction.array.sessions import calibrated, law_of, median_error, stored, study
 
 PRINT = Insole(elements=20, bad=6, minutes=4.0, rate_hz=1.0)
@@ -406,14 +398,8 @@ def test_files_of_every_reference(tmp_path):
     plate = session(table(tmp_path / "f.csv", ["time_s", "heel", "toe", "force_n"], [(0, 1, 2, 0), (1, 1, 3, 5)]), 1)
     assert np.isnan(plate.pressure_kpa).all()
     assert plate.force_n.tolist() == [0, 5]
-    np.savez(
-        tmp_path / "n.npz",
-        reading=np.ones((2, 3, 4)),
-        time_s=[0, 1],
-        pressure_kpa=[0.0, 5.0],
-        element=[0, 12],
-        area_mm2=20.0,
-    )
+    given = {"reading": np.ones((2, 3, 4)), "time_s": [0, 1], "pressure_kpa": [0.0, 5.0], "element": [0, 12]}
+    np.savez(tmp_path / "n.npz", **given, area_mm2=20.0)
     packed = session(tmp_path / "n.npz", 2)
     assert packed.reading.shape == (2, 12)
     assert np.nan_to_num(packed.pressure_kpa[1]).tolist() == [0] * 11 + [5]
@@ -449,21 +435,6 @@ def test_no_study_is_an_error(days):
         calibrated([deaf])
 
 
-def test_swapped_wires_are_named():
-    shape, kpa = (2, 3), np.full((3, 6), np.nan)
-    kpa[[0, 1, 2], [0, 1, 5]] = 100.0
-    reading = np.zeros((3, 6))
-    none = np.full(3, np.nan)
-
-    def pressed(order):
-        reads = np.where(np.isfinite(kpa), 0.1, 0.0).reshape(3, *shape)[:, :, order].reshape(3, 6)
-        return ArraySession("p", 0.0, np.arange(3.0), reading + reads, none < 0, kpa, none)
-
-    refuse_swapped(pressed([0, 1, 2]), shape)
-    with pytest.raises(BadInput, match="presses on c1 are read at c2: wires swapped"):
-        refuse_swapped(pressed([1, 0, 2]), shape)
-
-
 def test_commands_calibrate_and_invert_any_array(tmp_path):
     """Three days of a bladder, then a later session by the calibration alone, unloaded seconds recognised."""
     *known, later = Insole(elements=8, bad=2, minutes=2.0, rate_hz=1.0).sessions((0.0, 1.0, 2.0, 3.0))
@@ -484,10 +455,8 @@ def test_commands_calibrate_and_invert_any_array(tmp_path):
     assert np.isnan(found).all(0).sum() == 2
     late = later[2] + 60 * np.exp(-later[1] / 100)[:, None]
     np.savez(tmp_path / "late.npz", reading=late, time_s=later[1], rest=later[3] == 0, day=3.0)
-    code, text = run(tmp_path, "invert", "c.npz", "late.npz", "-o", "late.csv")
+    _, text = run(tmp_path, "invert", "c.npz", "late.npz", "-o", "late.csv")
     assert "late.npz: doubtful: readings at rest fall by" in text
-    after = np.genfromtxt((tmp_path / "late.csv").read_text().splitlines()[1:], delimiter=",")[:, 1::2]
-    assert np.nanmedian(np.abs(after - later[3][:, None])) < 20
     rows = [[t, 3.0, *("" if k == 7 else v for k, v in enumerate(c))] for t, c in zip(later[1], later[2], strict=True)]
     table(tmp_path / "l.csv", ["time_s", "day", *"hgfedcba"], [[*row[:2], *row[:1:-1]] for row in rows])
     rest = (later[3] == 0).astype(int)

@@ -15,13 +15,12 @@ from sensorgen.prediction.array.model import array_model
 from sensorgen.prediction.array.readout import ArrayReadout
 from sensorgen.prediction.array.study import study
 
-TRI = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
+from .conftest import array_of
 
 
 def model_of(border=None, **parameters):
     size = {} if border else {"length_mm": 40, "width_mm": 30}
-    given = {"parameters": size | {"between": "air"} | parameters, "cell": TRI}
-    return array_model(make({"shape": "array", "name": "a"} | given | ({"border": border} if border else {})))
+    return array_of(size | parameters, **({"border": border} if border else {}))
 
 
 @pytest.fixture(scope="module")
@@ -150,7 +149,6 @@ def test_an_outline_leaves_its_corner_out():
         (lambda m: study(m, ArrayReadout(), faults=["r1:9"]), BadInput, "expected r3:5"),
         (lambda m: study(m, ArrayReadout(), faults=["dead"]), BadInput, "fault 'dead'"),
         (lambda m: study(m, ArrayReadout(input_ohm=0.0)), OutOfRange, "input resistance"),
-        (lambda _: array_model(make({"shape": "tri"})), BadInput, "has no crossings"),
     ],
 )
 def test_no_study_is_an_error(model, make_it, error, words):

@@ -103,10 +103,7 @@ def test_a_tile_reaches_under_the_next():
     assert edge[2] == edge[3]
 
 
-INSOLE_5 = {
-    "border": "foot 42 left",
-    "parameters": {"pitch_x_mm": 5, "pitch_y_mm": 5, "column_mm": 4, "row_mm": 4},
-}
+INSOLE_5 = {"border": "foot 42 left", "parameters": {"pitch_x_mm": 5, "pitch_y_mm": 5, "column_mm": 4, "row_mm": 4}}
 
 
 def test_an_outline_fits_with_the_leads_that_the_refusal_advises():

@@ -80,13 +80,6 @@ def test_two_terminals_keep_their_real_part_where_the_tracks_conduct_well():
     assert found.imag == pytest.approx(expected.imag, rel=1e-12)
 
 
-def test_one_crossing_is_a_series_circuit():
-    tracks = Tracks.uniform(np.array([[6e-12]]), row_ohm=1.0, column_ohm=1.0, lead_ohm=700.0, tan_delta=0.02)
-    y = 2j * np.pi * 1e5 * 6e-12 * (1 - 0.02j)
-    assert readings(tracks, 1e5).siemens[0, 0] == pytest.approx(1 / (1 / y + 2 * 750), rel=1e-12)
-    assert readings(tracks, 1e5, readout="two-terminal").siemens[0, 0] == pytest.approx(1 / (1 / y + 1400), rel=1e-12)
-
-
 def test_what_is_cut_off_reads_nothing():
     tracks = some()
     lead = tracks.broken("row", 2, -1)

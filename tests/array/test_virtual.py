@@ -5,23 +5,13 @@ import pytest
 
 from sensorgen.analysis.plots import array as plots
 from sensorgen.core.errors import BadInput
-from sensorgen.design.design import make
 from sensorgen.measure.array_frames import of_frames, read
 from sensorgen.measure.virtual.array import nodal, printed, walked
 from sensorgen.prediction.array.frames import at_rest, inverted
-from sensorgen.prediction.array.model import array_model
 from sensorgen.prediction.array.readout import ArrayReadout
 from sensorgen.prediction.array.sessions import calibrated
 from sensorgen.solvers.tracks import Tracks, readings
 from sensorgen.workflows import insole
-
-CELL = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
-
-
-@pytest.fixture(scope="module")
-def model():
-    given = {"length_mm": 60, "width_mm": 50, "between": "air"}
-    return array_model(make({"shape": "array", "name": "a", "parameters": given, "cell": CELL}))
 
 
 @pytest.mark.parametrize(("kind", "digits"), [("guarded", 1e-10), ("two-terminal", 1e-5)])

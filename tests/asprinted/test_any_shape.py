@@ -18,7 +18,7 @@ from sensorgen.design.printer import load_printer, load_quality
 from sensorgen.export import slicing
 from sensorgen.models import prisms
 from sensorgen.prediction.bodies import from_gcode
-from sensorgen.scene.layers import drawn, outlines, scene_of
+from sensorgen.scene.layers import outlines, scene_of
 from sensorgen.scene.scene import Body, Prism, Scene, box, rounded
 
 PRINTER, FINE = load_printer("diabase-h5"), load_quality("fine")
@@ -47,7 +47,6 @@ def post(x, y, radius=0.8):
 
 PLACES = np.arange(PERIOD / 2, SIZE, PERIOD)
 POSTS = sensor([post(x, y) for x in PLACES for y in PLACES])
-LAYERS = drawn(POSTS, FINE.boundaries_mm(1.2))
 
 
 def test_a_pattern_of_posts_repeats_both_ways():

@@ -38,8 +38,3 @@ def test_a_line_fills_its_rectangle_and_what_lies_outside_the_raster_is_left_out
     assert inside == pytest.approx(1.0, rel=1e-3)
     assert filled[ledger._MARGIN + 21 : -2].sum() == pytest.approx(inside.sum(), rel=1e-3)
     assert filled[: ledger._MARGIN + 19].sum() == 0
-
-
-def test_nothing_fills_nothing():
-    none = np.zeros((0, 2))
-    assert not ledger.deposit(lines(none, none, np.zeros(0)), SHAPE).any()

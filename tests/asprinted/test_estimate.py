@@ -34,8 +34,6 @@ SLICED = {
 SOLVED = {"arachne": 147.07, "classic": 80.02, "cura": 76.86, "cura-gaps": 196.89}
 SOLVED_ALONG_X = SOLVED | {"cura": 78.45, "cura-gaps": 202.58}
 SOLVED_WITHIN = {"arachne": 4e-4, "classic": 4e-4, "cura": 2e-3, "cura-gaps": 6e-3}
-# What the slicers' own G-code gives, and how near the estimate has to come.
-REAL = {"arachne": (147.43, 0.02), "classic": (79.82, 0.02), "cura": (80.95, 0.07), "cura-gaps": (209.75, 0.07)}
 
 
 def tri(quality="fine", orientation="as-drawn", **more):
@@ -75,8 +73,6 @@ def test_capacitance_of_the_rules(walls, along):
     scene, plan = one_period(tri(along=along, **sides), walls)
     found = fem2d.capacitance(scene, EPS, 1e-3).middle() / (plan.area_mm2() / 2 * 1e-3) * 1e12
     assert found == pytest.approx((SOLVED_ALONG_X if along == "x" else SOLVED)[walls], rel=SOLVED_WITHIN[walls])
-    real, within = REAL[walls]
-    assert found == pytest.approx(real, rel=within)
 
 
 def test_a_strip_of_cura_keeps_the_side_that_lies_nearer_the_middle_of_the_bed():
@@ -161,18 +157,14 @@ def test_a_strip_in_any_direction_is_as_wide_as_its_walls_print_it(walls, width,
     assert made[0].region("strip").area == pytest.approx(printed * length if printed else 0.0, rel=1e-9)
 
 
-def test_strips_both_ways_in_a_layer_are_boxes():
-    crossed = Scene((Body("plate", "x60", (box(0, 2, 0, 5, 0, 0.1), box(2, 5, 0, 2, 0, 0.1))),), (5.0, 5.0, 0.1))
-    made = estimate(crossed, tri().machine, tri().layers, "cura-gaps")
+@pytest.mark.parametrize(
+    ("sides", "area_mm2"), [(((0, 2, 0, 5), (2, 5, 0, 2)), 16), (RING, 8)], ids=["both ways", "hole"]
+)
+def test_boxes_of_a_layer_stay_boxes_and_keep_their_hole(sides, area_mm2):
+    scene = Scene((Body("plate", "x60", tuple(box(*s, 0, 0.1) for s in sides)),), (5.0, 5.0, 0.1))
+    made = estimate(scene, tri().machine, tri().layers, "cura-gaps")
     assert all(p.is_box() for p in made.body("plate").pieces)
-    assert made.body("plate").volume_mm3() == pytest.approx(1.6, rel=1e-12)
-
-
-def test_an_outline_with_a_hole_keeps_its_hole():
-    ring = Scene((Body("plate", "x60", tuple(box(*s, 0, 0.1) for s in RING)),), (5.0, 5.0, 0.1))
-    made = estimate(ring, tri().machine, tri().layers, "cura-gaps")
-    assert made.body("plate").volume_mm3() == pytest.approx(0.8, rel=1e-12)
-    assert all(p.is_box() for p in made.body("plate").pieces)
+    assert made.body("plate").volume_mm3() == pytest.approx(0.1 * area_mm2, rel=1e-12)
 
 
 def test_an_unknown_way_of_walls():
@@ -204,16 +196,14 @@ def edges(layer):
     return layer.region("a").bounds[0::2]
 
 
-def test_edges_that_rounding_parted_become_one():
-    given = [strips(0.0, 0.1, (1.0, 2.0005)), strips(0.1, 0.2, (1.001, 2.4))]
-    found = window.cut(given, window.Window((1.0, 3.0), (0.0, 1.0)))
-    assert [edges(layer) for layer in found] == [(0.0, 1.0005), (0.0, 1.4)]
-
-
-def test_edges_that_rounding_parted_within_a_window_meet_in_their_middle():
-    given = [strips(0.0, 0.1, (1.2, 2.0)), strips(0.1, 0.2, (1.2, 2.001))]
-    found = window.cut(given, window.Window((1.0, 3.0), (0.0, 1.0)))
-    assert {edges(layer)[1] for layer in found} == {1.0005}
+@pytest.mark.parametrize(
+    ("below", "above", "cut"),
+    [((1.0, 2.0005), (1.001, 2.4), [(0.0, 1.0005), (0.0, 1.4)]), ((1.2, 2.0), (1.2, 2.001), [(0.2, 1.0005)] * 2)],
+    ids=["at the window's side", "in their middle"],
+)
+def test_edges_that_rounding_parted_become_one(below, above, cut):
+    found = window.cut([strips(0.0, 0.1, below), strips(0.1, 0.2, above)], window.Window((1.0, 3.0), (0.0, 1.0)))
+    assert [edges(layer) for layer in found] == [pytest.approx(of, abs=1e-12) for of in cut]
 
 
 def test_steps_that_overlap_by_less_than_any_printer_places_touch():

@@ -91,20 +91,6 @@ def test_the_narrowest_place_of_a_path_is_the_hole():
         assert [hole.area for hole in through(layers)] == pytest.approx([0.1])
 
 
-def test_a_shift_of_both_layers_alike_opens_nothing():
-    two = film(lines(0.5, 0.47), lines(0.5, 0.47, along_x=False))
-    areas = [
-        sum(h.area for h in through(opened(two, [1.0, 1.0], [shift, shift]))) for shift in ((0.0, 0.0), (0.05, -0.05))
-    ]
-    assert areas[0] == pytest.approx(areas[1], rel=1e-6)
-
-
-def test_parallel_layers_open_more_than_crossed_ones():
-    crossed, parallel = (film(lines(0.5, 0.45), lines(0.5, 0.45, along_x=k)) for k in (False, True))
-    area = [sum(h.area for h in through(opened(of, [1.0, 1.0]))) for of in (crossed, parallel)]
-    assert area[1] > 5 * area[0]
-
-
 @cache
 def printed(layers=2):
     """A plate of X60 with a film of some layers, printed by lines along x that leave a slit at y 0."""

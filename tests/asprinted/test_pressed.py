@@ -13,7 +13,7 @@ from sensorgen.models import press2d, press3d
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction import compression_law as celllaw
-from sensorgen.prediction.bodies import drawn, estimated, sliced
+from sensorgen.prediction.bodies import drawn, estimated
 from sensorgen.prediction.compression import PressQuestion
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import build_sensor, piece
@@ -91,17 +91,6 @@ def test_a_printed_cell_gives_way_like_one_built_by_hand(walls, fall_um):
     middle = (np.array(found.lower_f_per_m2) + np.array(found.upper_f_per_m2)) / 2
     assert middle == pytest.approx([c.middle() for c in hand.capacitance_f_per_m2], rel=0.01)
     assert found.body == f"printed, estimated ({WALLS[walls]})"
-
-
-@pytest.mark.nightly  # the drawing: tests/models/test_press2d.py; the print: the cell built by hand
-@needs_mesher
-def test_a_foot_of_a_lines_width_is_stiffer_than_a_sharp_one():
-    """At 10 kPa as drawn 6.13 um, by other programs; on feet of 0.34 mm less than a third of it."""
-    design = small()
-    sharp, found = answered(drawn(design), 10.0), answered(estimated(design, "arachne"), 10.0)
-    assert sharp.displacement_um[1] == pytest.approx(6.13, rel=0.02)
-    assert found.displacement_um[1] < sharp.displacement_um[1] / 3
-    assert sharp.body == "drawn"
 
 
 @needs_mesher
@@ -199,16 +188,3 @@ def test_a_print_that_no_model_can_speak_of_is_refused():
     design = small("double", {"length_mm": 12.0, "width_mm": 8.0})
     with pytest.raises(SensorgenError, match="two electrodes"):
         build_sensor(estimated(design))
-
-
-@pytest.mark.nightly  # a print's estimate: the cell built by hand; what PrusaSlicer prints: test_real.py
-@needs_mesher
-def test_what_prusaslicer_prints_is_pressed(real):
-    """Against the estimate by the same walls, whose widths differ by 2 %."""
-    design, lines, version = real("arachne")
-    made = sliced(design, lambda: body(design, lines, slicer=version), version, b"file")
-    found, guess = (answered(b, 20.0) for b in (made, estimated(design, "arachne")))
-    assert found.faults == ()
-    assert version in found.body
-    assert found.displacement_um[1] == pytest.approx(guess.displacement_um[1], rel=0.05)
-    assert found.upper_f_per_m2[0] == pytest.approx(guess.upper_f_per_m2[0], rel=0.01)

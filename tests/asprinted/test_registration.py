@@ -56,11 +56,7 @@ def test_raw_and_ready_files_are_one_print(made):
 
 @pytest.mark.parametrize(
     "place",
-    [
-        lambda x, y: (x + 37.3, y - 21.2),
-        lambda x, y: (-y, x),
-        lambda x, y: (-y + 40, x - 15),
-    ],
+    [lambda x, y: (x + 37.3, y - 21.2), lambda x, y: (-y, x), lambda x, y: (-y + 40, x - 15)],
     ids=["moved", "turned", "both"],
 )
 def test_it_is_found_wherever_it_stands(made, place, tmp_path):
@@ -112,12 +108,8 @@ def without(text, tool):
     return "\n".join(lines) + "\n"
 
 
-def test_what_is_not_the_design_is_said(made, tmp_path):
-    design, done = made
-    with pytest.raises(BadInput, match=r"no piece of 20 x 8 mm.*it prints 12(\.\d+)? x 8(\.\d+)? mm at x"):
-        placed(small(parameters={"length_mm": 20.0}), done.raw)
-    with pytest.raises(BadInput, match=r"tools \[.*\] print in this G-code; expected \[.*5.*\]"):
-        placed(small(tools={"x60": 5}), done.raw)
+def test_what_is_no_g_code_is_said(tmp_path):
+    design = small()
     with pytest.raises(BadInput, match="cannot read"):
         from_gcode(design, tmp_path / "missing.gcode")
     (tmp_path / "no.gcode").write_bytes(bytes(range(256)))

@@ -11,7 +11,7 @@ from math import hypot, pi
 
 import numpy as np
 from scipy import ndimage, sparse
-from scipy.sparse.linalg import LinearOperator, cg
+from scipy.sparse.linalg import cg
 
 EPS0 = 8.8541878128e-12  # F/m
 FILAMENT_MM2 = pi / 4 * 1.75**2
@@ -137,36 +137,20 @@ def capacitance(tools, heights, size, thin, eps, conductor):
     potential = np.where(metal & ~bottom, 1.0, 0.0)
     value = np.vectorize(lambda tool: eps.get(tool, 0.0))(solid)
     side = size / tools.shape[1]
-    free = np.flatnonzero(~metal.ravel())
-    number = np.full(metal.size, -1)
-    number[free] = np.arange(len(free))
-    index = np.arange(metal.size).reshape(metal.shape)
-    rows, cols, data = [], [], []
-    diagonal, right = np.zeros(len(free)), np.zeros(len(free))
-    deep = np.broadcast_to(height[:, None, None], metal.shape)
-    faces = []
+    index, faces = np.arange(metal.size).reshape(metal.shape), []
+    deep, e, m = np.broadcast_to(height[:, None, None], metal.shape), value.ravel(), metal.ravel()
     for axis in range(3):
         a, b = (np.take(index, np.arange(start, metal.shape[axis] - 1 + start), axis).ravel() for start in (0, 1))
         half = (deep if axis == 0 else np.full(metal.shape, side)).ravel() / 2
         area = side**2 if axis == 0 else side * deep.ravel()[a]
-        e, m = value.ravel(), metal.ravel()
         with np.errstate(divide="ignore"):
             against = np.where(m[a], 0.0, half[a] / e[a]) + np.where(m[b], 0.0, half[b] / e[b])
-            g = np.where(m[a] & m[b], 0.0, area / against)
-        faces.append((a, b, g))
-        for i, j in ((a, b), (b, a)):
-            mine = ~m[i]
-            np.add.at(diagonal, number[i[mine]], g[mine])
-            fixed = mine & m[j]
-            np.add.at(right, number[i[fixed]], g[fixed] * potential.ravel()[j[fixed]])
-            both = mine & ~m[j]
-            rows.append(number[i[both]]), cols.append(number[j[both]]), data.append(-g[both])
-    matrix = sparse.csr_array(
-        (np.concatenate(data), (np.concatenate(rows), np.concatenate(cols))), shape=(len(free), len(free))
-    ) + sparse.diags_array(diagonal)
-    found, info = cg(matrix.tocsr(), right, rtol=1e-7, M=LinearOperator(matrix.shape, lambda v: v / diagonal))
+            faces.append((a, b, np.where(m[a] & m[b], 0.0, area / against)))
+    a, b, g = map(np.concatenate, zip(*faces, strict=True))
+    off = sparse.coo_array((g, (a, b)), shape=(metal.size,) * 2).tocsr()
+    off = off + off.T
+    matrix = (sparse.diags_array(off.sum(1)) - off).tocsr()
+    u, inner = potential.ravel().copy(), matrix[~m][:, ~m]
+    u[~m], info = cg(inner, -(matrix @ u)[~m], rtol=1e-7, M=sparse.diags_array(1 / inner.diagonal()))
     assert info == 0
-    u = potential.ravel().copy()
-    u[free] = found
-    energy = sum(float((g * (u[a] - u[b]) ** 2).sum()) for a, b, g in faces)
-    return EPS0 * energy * 1e-3
+    return EPS0 * float(u @ (matrix @ u)) * 1e-3

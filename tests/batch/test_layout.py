@@ -67,24 +67,6 @@ def test_a_full_plate_stays_clear_of_what_stands_in_its_middle(gap):
         assert len(first) >= 0.5 * ((60 + gap) * (40 + gap) - (10 + gap) ** 2) / (side + gap) ** 2
 
 
-@pytest.mark.parametrize("printer", PRINTERS)
-def test_the_towers_brim_is_kept_clear(printer):
-    machine = load_printer(printer)
-    (kept,) = room(machine, FINE, 2, 5.0, 0.0).tower
-    at = tower(machine, FINE, 2)
-    assert kept == Rect(at.x_mm - 2, at.y_mm - 2, at.x_mm + at.side_mm + 2, at.y_mm + at.side_mm + 2)
-
-
-@settings(deadline=None, max_examples=30)
-@given(SIZES)
-def test_the_same_sizes_have_the_same_places(sizes):
-    assert packed(sizes, diabase()) == packed(list(sizes), diabase())
-
-
-def test_twenty_sensors_on_one_plate():
-    assert len(packed([SENSOR] * 20, diabase())) == 1
-
-
 def test_no_plate_holds_more_than_its_area_and_few_much_less():
     sizes = [SENSOR] * 200
     plates = packed(sizes, diabase())

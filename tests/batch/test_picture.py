@@ -65,14 +65,3 @@ def test_small_specimens_have_their_number_alone(tmp_path):
     plan.write_text("iteration: 1\ndesigns: [{shape: tri, replicates: 30, parameters: {length_mm: 6, width_mm: 6}}]\n")
     texts = [t.text for t in drawn(arranged(plan)).iter(f"{SVG}text") if t.get("text-anchor") and t.text != "tower"]
     assert texts == [str(k) for k in range(1, 31)]
-
-
-def test_more_designs_than_colours_share_them():
-    class Known:
-        def __init__(self, key):
-            self.design, self.name = self, f"{key:03}"
-            self.design_id = self.name
-
-    found = layout.colours([Known(k) for k in range(20)])
-    assert list(found) == [f"{k:03}" for k in range(20)]
-    assert len({found[key] for key in list(found)[:8]}) == 8

@@ -1,8 +1,5 @@
 """Plans: what they mean, and what is wrong with wrong ones."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,25 +8,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
-from sensorgen.design import design
 from sensorgen.workflows.batch import arranged
 from sensorgen.workflows.batch.plan import BatchPlan, Item, load, pieces, shuffled, tools
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "docs" / "examples" / "film-study.yaml"
 HEAD = "iteration: 26\ndesigns:\n"
-
-
-@pytest.fixture
-def plan(tmp_path):
-    """Write a plan; gives its path."""
-
-    def write(text, name="plan.yaml"):
-        path = tmp_path / name
-        path.write_text(text, "utf-8")
-        return path
-
-    return write
 
 
 def read(path):
@@ -127,12 +111,6 @@ def test_wrong_plans(plan, text):
     assert WRONG[text] in str(error.value)
 
 
-def test_the_nearest_design_is_offered(plan, tmp_path):
-    (tmp_path / "trix-d0.1.yaml").write_text("shape: tri\n")
-    with pytest.raises(UnknownName, match=r"did you mean 'trix-d0.1.yaml'"):
-        read(plan(HEAD + "  - {design: trix-d01.yaml}\n"))
-
-
 @pytest.mark.parametrize(
     ("one", "other", "said"),
     [
@@ -151,11 +129,6 @@ def test_designs_that_no_plate_holds_together(plan, tmp_path, one, other, said):
     assert said in str(error.value)
 
 
-def test_tools_are_those_of_all_designs():
-    plain, held = design.make({"shape": "tri"}), design.make({"shape": "rect", "materials": {"support": "bvoh"}})
-    assert tools([plain, held]) == {3: "etpu", 4: "x60", 5: "bvoh"}
-
-
 def test_the_order_is_drawn_by_the_seed_alone():
     found = read(EXAMPLE)
     one = [p.name for p in shuffled(found, 2026)]
@@ -172,30 +145,6 @@ def test_places_in_the_order_are_as_good_as_evenly_spread():
     first = [shuffled(found, seed)[0].name for seed in range(2000)]
     expected = 2000 / len(found)
     assert sum((first.count(p.name) - expected) ** 2 / expected for p in found) < 43.8
-
-
-def test_the_order_does_not_hang_on_pythons_own_hashes():
-    code = (
-        "from pathlib import Path\nfrom sensorgen.workflows.batch.plan import pieces, shuffled\n"
-        "from sensorgen.workflows.batch.plan import load\n"
-        f"path = Path({str(EXAMPLE)!r})\nprint([p.name for p in shuffled(pieces(load(path), path.parent), 1)])"
-    )
-    runs = {
-        subprocess.run(
-            [sys.executable, "-c", code],
-            capture_output=True,
-            encoding="utf-8",
-            check=True,
-            env={**os.environ, "PYTHONHASHSEED": seed},
-        ).stdout
-        for seed in ("1", "2")
-    }
-    assert len(runs) == 1
-
-
-def test_a_huge_specimen_fits_nowhere(plan):
-    with pytest.raises(OutOfRange, match=r"plan\.yaml: a specimen of .* fits on no plate"):
-        arranged(plan(HEAD + "  - {shape: tri, parameters: {length_mm: 400}}\n"))
 
 
 def test_the_page_shows_the_example_and_every_key_of_a_plan():
@@ -230,3 +179,14 @@ def test_any_mapping_is_a_plan_or_refused_in_words(tmp_path, data, whole):
     except SensorgenError:
         return
     assert len({piece.name for piece in found.pieces}) == len(found.pieces)
+
+
+def test_a_huge_specimen_fits_nowhere(plan):
+    with pytest.raises(OutOfRange, match=r"plan\.yaml: a specimen of .* fits on no plate"):
+        arranged(plan(HEAD + "  - {shape: tri, parameters: {length_mm: 400}}\n"))
+
+
+def test_the_nearest_design_is_offered(plan, tmp_path):
+    (tmp_path / "trix-d0.1.yaml").write_text("shape: tri\n")
+    with pytest.raises(UnknownName, match=r"did you mean 'trix-d0.1.yaml'"):
+        read(plan(HEAD + "  - {design: trix-d01.yaml}\n"))

@@ -44,9 +44,8 @@ def test_every_file_has_its_hash(small, contents):
     assert record == json.loads(document.to_json(small.record))
     files = {k: hashlib.sha256(v).hexdigest() for k, v in contents(small.folder).items() if k != RECORD}
     assert record["files"] == files
-    assert {"plan.yaml", "plate.svg", "labels.html"} | {f"small.{f}.3mf" for f in ("prusa", "cura", "orca")} <= set(
-        files
-    )
+    plates = {f"small.{slicer}.3mf" for slicer in ("prusa", "cura", "orca")}
+    assert {"plan.yaml", "plate.svg", "labels.html"} | plates <= set(files)
 
 
 def test_every_specimen_is_traced_to_its_design_and_has_what_it_should_measure(small):
@@ -83,10 +82,8 @@ def test_tools_lots_and_the_checklist(small):
         "Cam dial of T4: 5", "Clean the nozzles of T3, T4", "level", "Bake at 150 C for 24 h",
     ):  # fmt: skip
         assert said in text
-    order = [
-        next(k for k, line in enumerate(lines) if word in line)
-        for word in ("Dry", "Load", "level", "not baked", "Bake")
-    ]
+    words = ("Dry", "Load", "level", "not baked", "Bake")
+    order = [next(k for k, line in enumerate(lines) if word in line) for word in words]
     assert order == sorted(order)
 
 

@@ -1,14 +1,12 @@
 """What holds for the findings of all rules: order, form, merging, waivers, and clean sensors."""
 
-import json
 import re
 from pathlib import Path
 
 import pytest
 
 from sensorgen.checks import rules as checks
-from sensorgen.checks.review import report, review
-from sensorgen.core.document import to_json
+from sensorgen.checks.review import review
 from sensorgen.core.findings import SEVERITIES, Finding
 from sensorgen.design.design import make
 from sensorgen.scene.scene import Body, box
@@ -18,10 +16,6 @@ BAD = {
     "parameters": {"length_mm": 8.3, "width_mm": 4.0, "dielectric_mm": 0.14},
     "orientation": "upside-down",
 }
-
-
-def test_a_plate_has_no_findings():
-    assert review(make({"shape": "reference"})).findings == []
 
 
 def test_findings_come_with_the_worst_first_and_complete():
@@ -34,10 +28,7 @@ def test_findings_come_with_the_worst_first_and_complete():
         assert f.body
         assert f.message
         assert f.advice
-        assert f.rule in ("7-printed", "9-support") or None not in (
-            f.value_mm,
-            f.limit_mm,
-        )
+        assert f.rule in ("7-printed", "9-support") or None not in (f.value_mm, f.limit_mm)
         assert f.layer is not None or f.place_mm is not None
 
 
@@ -45,13 +36,6 @@ def test_the_margin_is_negative_on_either_side_of_the_limit():
     assert Finding("9-bridge", "error", "b", "m", "a", value_mm=0.3, limit_mm=0.22).margin_mm == -0.08
     assert Finding("5-width", "error", "b", "m", "a", value_mm=0.1, limit_mm=0.12).margin_mm == -0.02
     assert Finding("5-width", "info", "b", "m", "a").margin_mm is None
-
-
-def test_the_report_is_plain_json():
-    design = make(BAD)
-    first = json.loads(to_json(report(design, review(design))))["findings"][0]
-    told = {"rule", "severity", "body", "layer", "place_mm", "value_mm", "limit_mm", "margin_mm", "advice", "waiver"}
-    assert set(first) >= told
 
 
 def test_the_same_finding_in_layer_after_layer_is_one(sensor, findings):
@@ -92,12 +76,6 @@ def test_what_is_waived_stops_nothing():
     assert review(make(BAD)).errors() != []
 
 
-def test_one_waiver_leaves_the_other_errors():
-    island = {"rule": "9", "reason": "tried on the bench"}
-    held = review(make(BAD | {"waivers": [island]}))
-    assert not any(f.rule == "9-bridge" for f in held.errors())
-
-
 def test_the_quality_decides_which_faces_are_off_the_grid():
     plate = {"shape": "reference", "parameters": {"dielectric_mm": 0.6, "electrode_mm": 0.3}}
     assert review(make(plate | {"quality": "fine"})).findings == []
@@ -109,7 +87,5 @@ def test_the_quality_decides_which_faces_are_off_the_grid():
 def test_every_rule_has_a_name_that_a_target_may_refuse():
     """Rules are names such as 2-film in the source; RULES lists them all."""
     source = Path(checks.__file__).parents[1]
-    written = {
-        name for file in source.rglob("*.py") for name in re.findall(r'"(\d+-[a-z-]+)"', file.read_text("utf-8"))
-    }
-    assert written == set(checks.RULES)
+    text = "".join(file.read_text("utf-8") for file in source.rglob("*.py"))
+    assert set(re.findall(r'"(\d+-[a-z-]+)"', text)) == set(checks.RULES)

@@ -51,12 +51,7 @@ def test_triangles_of_0_24_print_as_0_20(findings, film_mm, drawn, printed):
 # Samples lie at 1.25, 1.35, ...: a part of the body from 1.26 to 1.34 is met by none.
 @pytest.mark.parametrize(
     ("low", "high", "lost"),
-    [
-        (1.26, 1.34, True),
-        (1.25 + HAIR, 1.35 - HAIR, True),
-        (1.25 - HAIR, 1.34, False),
-        (1.26, 1.35 + HAIR, False),
-    ],
+    [(1.26, 1.34, True), (1.25 + HAIR, 1.35 - HAIR, True), (1.25 - HAIR, 1.34, False), (1.26, 1.35 + HAIR, False)],
 )
 def test_a_part_that_no_sample_meets_is_an_error(sensor, findings, low, high, lost):
     found = [f for f in findings(sensor(patch(low, high)), "4-", "patch") if f.severity == "error"]

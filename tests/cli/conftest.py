@@ -4,12 +4,12 @@ import json
 import os
 import subprocess
 import sys
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from sensorgen.cli import main
+from in_process import Said, captured
 
 EACH = """
 import contextlib, io, json, sys
@@ -26,42 +26,12 @@ for words in json.loads(sys.argv.pop()):
 TEMPLATE = "import sys; sys.argv[0] = 'sensorgen'; from sensorgen.cli import main; {before}; main()"
 
 
-@dataclass(frozen=True)
-class Said:
-    """What a command left behind: exit code, and what it wrote where."""
-
-    code: int
-    out: str
-    err: str
-
-    @property
-    def words(self):
-        """The output without its line breaks and columns."""
-        return " ".join(self.out.split())
-
-    @property
-    def line(self) -> str:
-        """The one line on stderr; anything else there is a fault."""
-        assert self.err.count("\n") == 1, self.err
-        assert self.err.startswith("sensorgen: "), self.err
-        assert "Traceback" not in self.out + self.err
-        return self.err.strip()
-
-
 @pytest.fixture
 def run(capfd, monkeypatch, tmp_path):
     """Run a command in this process, in an empty folder; gives :class:`Said`."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
-
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["sensorgen", *map(str, words)])
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as left:
-            main()
-        return Said(left.value.code, *capfd.readouterr())
-
-    return call
+    return partial(captured, capfd, monkeypatch)
 
 
 @pytest.fixture
@@ -69,15 +39,10 @@ def start(tmp_path):
     """Start a command in a process of its own; ``before`` is Python that goes ahead of it."""
 
     def call(*words, before="pass", cwd=tmp_path, **environment):
-        return subprocess.Popen(
-            [sys.executable, "-c", TEMPLATE.format(before=before), *map(str, words)],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            encoding="utf-8",
-            cwd=cwd,
-            env={**os.environ, "COLUMNS": "80", **environment},
-        )
+        command = [sys.executable, "-c", TEMPLATE.format(before=before), *map(str, words)]
+        streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        env = {**os.environ, "COLUMNS": "80", **environment}
+        return subprocess.Popen(command, **streams, encoding="utf-8", cwd=cwd, env=env)
 
     return call
 
@@ -110,9 +75,8 @@ def loaded(tmp_path):
     """Run commands one after another in one fresh interpreter; exit code of each, and all modules loaded by then."""
 
     def call(*commands):
-        done = subprocess.run(
-            [sys.executable, "-c", EACH, json.dumps(commands)], cwd=tmp_path, stdout=subprocess.PIPE, check=True
-        )
+        words = [sys.executable, "-c", EACH, json.dumps(commands)]
+        done = subprocess.run(words, cwd=tmp_path, stdout=subprocess.PIPE, check=True)
         found = [json.loads(line) for line in done.stdout.splitlines()]
         assert len(found) == len(commands)
         return found
@@ -128,9 +92,8 @@ def disk(tmp_path):
     def mount(size):
         place = tmp_path / "disk"
         place.mkdir()
-        done = subprocess.run(
-            ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", place], capture_output=True, encoding="utf-8"
-        )
+        words = ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", place]
+        done = subprocess.run(words, capture_output=True, encoding="utf-8")
         if done.returncode:
             pytest.skip(f"cannot mount a small disk here: {done.stderr.strip()}")
         mounted.append(place)

@@ -68,12 +68,6 @@ def test_build_writes_the_wires(run, file, tmp_path, monkeypatch):
     assert {"p.prusa.3mf", "p.html", "check.json"} <= {path.name for path in (tmp_path / "out" / "p").iterdir()}
 
 
-def test_the_shape_has_options_like_others(run):
-    said = run("check", "array", "--rows", "2", "--columns", "3", "--budget", "0", "--json")
-    assert said.code == 0, said.err
-    assert "PRINT" in said.out
-
-
 @pytest.mark.parametrize(
     ("words", "answer"),
     [
@@ -114,3 +108,9 @@ def test_build_writes_each_tile(run, tmp_path, monkeypatch):
     for row in rows:
         files = {path.name for path in (tmp_path / "out" / row["design"]).iterdir()}
         assert {"wires.csv", f"{row['design']}.prusa.3mf", f"{row['design']}.html"} <= files
+
+
+def test_the_shape_has_options_like_others(run):
+    said = run("check", "array", "--rows", "2", "--columns", "3", "--budget", "0", "--json")
+    assert said.code == 0, said.err
+    assert "PRINT" in said.out

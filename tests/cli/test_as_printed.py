@@ -84,13 +84,6 @@ def test_all_walls_are_in_the_range_of_the_print(run):
     assert (found["value"], found["lower"], found["upper"]) == pytest.approx(ends)
 
 
-def test_a_waiver_accepts_lost_layers(run, tmp_path):
-    waivers = "waivers: [{rule: '7', reason: tips are known to go}]"
-    (tmp_path / "mine.yaml").write_text(f"shape: tri\nparameters: {{length_mm: 12, width_mm: 8}}\n{waivers}\n")
-    assert run("check", str(tmp_path / "mine.yaml")).code == 0
-    assert run("check", *SMALL).code == 1
-
-
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -112,26 +105,12 @@ def loaded(run, *words):
     return json.loads(said.out)
 
 
-def test_loads_on_a_plate_are_as_drawn(run):
-    """Print that is the plate itself."""
-    words = ("reference", "--size", "12x8")
-    drawn, printed = loaded(run, *words, "--drawn"), loaded(run, *words)
-    assert printed["im_ohm"][0] == [[pytest.approx(x, rel=1e-9) for x in row] for row in drawn["im_ohm"][0]]
-
-
 def test_loads_are_of_the_printed_capacitance(run):
     """X at rest and low frequency is 1 / (2 pi f C), and C of the print is what it is told to be at rest."""
     words = (*SMALL, "--dielectric", "0.1", "--compression", "unconfined")
     at_rest = predicted(run, *words, "--walls", "classic")["capacitance"]["value"]
     x = loaded(run, *words, "--walls", "classic")["im_ohm"][0][0][0]
     assert x == pytest.approx(-1 / (2 * 3.14159265 * 1.1e3 * at_rest), rel=1e-6)
-
-
-def test_a_missing_slicer_is_told(run, monkeypatch):
-    monkeypatch.setenv("PATH", "/nowhere")
-    said = run("predict", *SMALL, "--slicer", "prusa")
-    assert said.code == 2
-    assert "prusa-slicer" in said.line
 
 
 def test_the_drawing_has_printed_outlines_and_rule_7(run):
@@ -187,10 +166,9 @@ def test_a_compensation_that_senses_worse_says_so(monkeypatch):
     """Half as fine a force resolution, and a position that is lost."""
     asked = make({"shape": "reference"})
     made = Trial("a", "b", "", "predicted", "", "PRINT", (), 6.0, 0.05, 0.1, Numbers(), Numbers())
-    fine, coarse = (
-        replace(made, printed=Numbers(force_resolution=Bounds.of(n, "N"), position_resolution=Bounds.of(m, "m")))
-        for n, m in ((0.1, 0.01), (0.2, 0.2))
-    )
+    both = ((Bounds.of(0.1, "N"), Bounds.of(0.01, "m")), (Bounds.of(0.2, "N"), Bounds.of(0.2, "m")))
+    numbers = (Numbers(force_resolution=n, position_resolution=m) for n, m in both)
+    fine, coarse = (replace(made, printed=one) for one in numbers)
     monkeypatch.setattr(build, "trial", lambda *_, **__: fine)
     monkeypatch.setattr(build.decision, "is_known", lambda _: True)
     assert build._compared(asked, coarse).endswith(": force resolution 2 x worse, position resolution lost")

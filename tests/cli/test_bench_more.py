@@ -1,7 +1,9 @@
 """``sensorgen bench hysteresis|sets|live`` on runs whose truth is known."""
 
 import csv
+import io
 import json
+import sys
 
 import made
 import numpy as np
@@ -131,12 +133,8 @@ def test_readings_are_filtered_as_they_come(run, tmp_path):
 
 
 def test_a_stream_is_answered_row_by_row(run, tmp_path, monkeypatch):
-    import io
-    import sys
-
-    monkeypatch.setattr(
-        sys, "stdin", io.TextIOWrapper(io.BytesIO(b"re_ohm_1kHz,im_ohm_1kHz\n5,1\n,\n5,1\n"), encoding="utf-8")
-    )
+    table = b"re_ohm_1kHz,im_ohm_1kHz\n5,1\n,\n5,1\n"
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(table), encoding="utf-8"))
     said = run("bench", "live", "-", "--rate", "140")
     assert (said.code, said.out) == (0, "re_ohm_1kHz,im_ohm_1kHz\n5,1\n,\n5,1\n")
     assert "a cut-off of 80 Hz at 140 samples/s" in run("bench", "live", "-", "--rate", "140", "--cutoff", "80").line
@@ -156,10 +154,3 @@ def test_wrong_words_are_told(run, tmp_path, words, said):
     found = run("bench", *words)
     assert found.code == 2
     assert said in found.err
-
-
-def test_a_law_that_is_named_is_taken_and_told(run, tmp_path):
-    write(tmp_path, "a", made.presses(4))
-    words = ("bench", "show", "a.mat", "--rig", "a.csv")
-    assert "smooth: a cubic and five logarithms" in run(*words, "--drift", "smooth").out
-    assert json.loads(run(*words, "--drift", "wandering", "--json").out)["drift_law"] == "wandering"

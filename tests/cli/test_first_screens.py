@@ -63,11 +63,6 @@ def test_an_output_of_build_is_a_folder_or_an_error(run):
     assert (said.code, Path("file").read_text()) == (2, "")
 
 
-def test_help_lists_the_options_of_a_command(run):
-    said = run("predict", "--help")
-    assert {"--force", "--position", "--slicer", "--details"} <= set(said.out.replace(",", " ").split())
-
-
 def test_a_sweep_names_the_source_of_each_row_and_what_cannot_be_located():
     force, far = Bounds.of(0.5, "N"), Bounds.of(0.188, "m")
     head = (SCHEMA, "a", "0", "printed, estimated (PrusaSlicer, Arachne walls)", "predicted", 6.0, 0.05)

@@ -12,8 +12,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sensorgen import cli
-from sensorgen.cli import main  # noqa: F401 - the fixtures run it
 from sensorgen.design.design import make
 from sensorgen.prediction.bodies import default_body
 from sensorgen.prediction.sensor_model import sensor_model
@@ -21,19 +19,9 @@ from sensorgen.prediction.sensor_model import sensor_model
 TONES = {"1.1kHz": 1.1e3, "10.1kHz": 10.1e3, "99.7kHz": 99.7e3, "0.5MHz": 5e5}
 QUIET = ["--noise", "0.01%"]  # as printed the film is 0.2 mm, and presses of 1 N are lost in the usual noise
 DESIGN = ["tri", "--dielectric", "0.1", "--perfect", "--material", "electrode=etpu@thesis-3.2"]
-PLAIN = {
-    "shape": "tri",
-    "parameters": {"dielectric_mm": 0.1},
-    "materials": {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesis-3.2"},
-}
+SLOTS = {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesis-3.2"}
+PLAIN = {"shape": "tri", "parameters": {"dielectric_mm": 0.1}, "materials": SLOTS}
 FORCE, POSITION = np.array([1.0, 2.0, 3.0, 5.0]), np.array([20.0, 40.0, 60.0, 75.0])
-
-
-@pytest.fixture(autouse=True)
-def registered(monkeypatch):
-    """The command, also before the list of commands names it."""
-    if "invert" not in cli.COMMANDS:
-        monkeypatch.setattr(cli, "COMMANDS", (*cli.COMMANDS, "invert"))
 
 
 @cache
@@ -200,15 +188,10 @@ def test_in_real_time_readings_that_wait_are_dropped_and_counted(run, monkeypatc
     assert "dropped" not in every.err
 
 
-LIVE = (
-    "import sys; sys.argv[0] = 'sensorgen'; import sensorgen.cli as c; c.COMMANDS = {*c.COMMANDS, 'invert'}; c.main()"
-)
-
-
 def test_a_pipe_is_answered_line_by_line(tmp_path):
     head, *rows = table().splitlines(keepends=True)
     process = subprocess.Popen(
-        [sys.executable, "-c", LIVE, "invert", *DESIGN, "-"], cwd=tmp_path, encoding="utf-8", bufsize=1,
+        [sys.executable, "-m", "sensorgen", "invert", *DESIGN, "-"], cwd=tmp_path, encoding="utf-8", bufsize=1,
         env={k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"},
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip

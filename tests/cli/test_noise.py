@@ -11,7 +11,6 @@ import pytest
 from sensorgen.analysis.report.alternating import AcRow
 from sensorgen.analysis.report.recordings import ImpedanceRow
 from sensorgen.core import document
-from sensorgen.core.units import frequency_text
 from sensorgen.measure.signal.results import RecordingResult, RestResult
 
 DIVIDES = (
@@ -79,11 +78,6 @@ def test_random_bytes_are_no_photo(run):
     assert "'x.jpg' is no photo; expected JPEG, PNG" in said.line
     Path("x.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(99))
     assert run("log", "add", "23 triX", "--y", "650", "--photo", "x.png", "--log", "log.db").code == 0
-
-
-def test_a_frequency_has_no_digits_of_rounding():
-    assert frequency_text(3e6 * (1 + 2**-52)) == "3MHz"
-    assert frequency_text(1234567.890123456) == "1.234567890123456MHz"
 
 
 def test_a_capacitance_says_how_it_is_meant():

@@ -42,6 +42,13 @@ def put(folder, what, name, change=("", "")):
     return path
 
 
+@pytest.fixture
+def mine(here):
+    """The files that the design of this module needs, beside it."""
+    names = {"eel": "material", "zig": "shape", "mine": "printer"}
+    return {name: put(here, what, name) for name, what in names.items()}
+
+
 def install(folder, monkeypatch, value="lab_pack", name="lab"):
     """A package with a pack, as an installer leaves it."""
     put(folder / "lab_pack", "material", "lab-ink")
@@ -82,9 +89,7 @@ def test_a_new_design_is_the_shape_by_its_name(run):
 
 
 def test_by_options_alone(run):
-    for words in (("material", "eel"), ("shape", "zig")):
-        run("new", *words)
-    run("pack", "trust", ".")
+    put(Path(), "material", "eel"), put(Path(), "shape", "zig")
     for shape in ("zig", "./shapes/zig.py"):
         said = run("check", shape, "--material", "electrode=eel", "--tool", "eel=1", "--film", "0.3", "--json")
         assert (said.code, said.err) == (0, "")
@@ -99,10 +104,7 @@ def test_by_options_alone(run):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (
-            "check tri --material electrode=eel",
-            "unknown material 'eel'. .*; your own: sensorgen new material eel",
-        ),
+        ("check tri --material electrode=eel", "unknown material 'eel'. .*; your own: sensorgen new material eel"),
         ("check zig", "unknown shape 'zig'. Known: .*; your own: sensorgen new shape zig"),
         ("check tri --printer mk4", "unknown printer 'mk4'. Known: .*; your own: sensorgen new printer mk4"),
         ("new material x60", "a material 'x60' ships with sensorgen .pack thesis.; choose another name"),
@@ -111,10 +113,7 @@ def test_by_options_alone(run):
         ("pack test nothing", "unknown pack 'nothing'. Known: .*thesis"),
         ("pack test .", ".: no files of a pack; expected folders as materials, sources, shapes"),
         ("pack trust thesis", "thesis: has no shapes; expected a pack with shapes, a shape's file"),
-        (
-            "check tri --layer-height 0.2",
-            "unknown option '--layer-height': the print quality has it; take another with",
-        ),
+        ("check tri --layer-height 0.2", "unknown option '--layer-height': the print quality has it; take another"),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(run, words, expected):
@@ -245,50 +244,35 @@ def test_packs_that_require_each_other(run, here):
     assert run("pack", "test", "a").code == 0
 
 
-def test_the_identity_of_a_design_holds_the_content_of_its_files(here):
-    files = {
-        "eel": put(here, "material", "eel"),
-        "zig": put(here, "shape", "zig"),
-        "mine": put(here, "printer", "mine"),
-    }
+def test_the_identity_of_a_design_holds_the_content_of_its_files(here, mine):
     before = made().id()
     assert made(name="other").id() == before
     for name, old, new, same in (
         ("eel", "value: 0.1,", "value: 0.11,", False), ("eel", "# in drawings", "# colour", True),
         ("zig", "p.period_mm / 4", "1.0 * p.period_mm / 4", False),
-        ("mine", "[250.0, 210.0]", "[240.0, 210.0]", False),
-        ("mine", "# or: centre", "", True),
+        ("mine", "[250.0, 210.0]", "[240.0, 210.0]", False), ("mine", "# or: centre", "", True),
     ):  # fmt: skip
-        text = files[name].read_text()
+        text = mine[name].read_text()
         assert old in text
-        files[name].write_text(text.replace(old, new))
-        shape_files.trust(name, files[name].read_text())
+        mine[name].write_text(text.replace(old, new))
+        shape_files.trust(name, mine[name].read_text())
         assert (made().id() == before) is same, (name, new)
-        files[name].write_text(text)
+        mine[name].write_text(text)
     for name in ("materials", "shapes", "printers"):
         shutil.move(here / name, packs.place() / "moved" / name)
     assert made().id() == before
 
 
-def test_a_record_of_a_design_does_not_need_its_files(here):
-    put(here, "material", "eel"), put(here, "shape", "zig"), put(here, "printer", "mine")
+def test_a_record_of_a_design_does_not_need_its_files_and_goes_to_another_process(here, mine):
     before = made()
-    record = json.loads(json.dumps(before.resolved()))
-    for name in ("materials", "shapes", "printers"):
-        shutil.rmtree(here / name)
-    again = design.of_resolved("zig", record)
-    assert again.id() == before.id()
-    assert again.drawn == before.drawn
+    sent, record = pickle.dumps(before), json.dumps(before.resolved())
+    for file in mine.values():
+        shutil.rmtree(file.parent)
+    assert pickle.loads(sent) == before
+    for again in (design.of_resolved("zig", json.loads(record)), pickle.loads(sent)):
+        assert (again.id(), again.drawn) == (before.id(), before.drawn)
     with pytest.raises(UnknownName, match="unknown shape 'zig'"):
         made()
-
-
-def test_a_design_goes_to_another_process(here):
-    put(here, "material", "eel"), put(here, "shape", "zig"), put(here, "printer", "mine")
-    before = made()
-    again = pickle.loads(pickle.dumps(before))
-    assert again == made()
-    assert (again.id(), again.drawn) == (before.id(), before.drawn)
 
 
 def test_designs_of_a_batch_have_the_files_beside_them(here):
@@ -410,12 +394,8 @@ def test_nothing_of_a_strangers_folder_runs_unasked(run, words, monkeypatch):
 
 
 def test_a_strangers_text_moves_no_terminal_in_the_help_and_takes_none_of_its_options(run):
-    text = (
-        (TEMPLATES / "shape.py")
-        .read_text("utf-8")
-        .replace("height_mm", "help")
-        .replace("Height of", "a\\x1b[2J\\u202eb")
-    )
+    text = (TEMPLATES / "shape.py").read_text("utf-8").replace("height_mm", "help")
+    text = text.replace("Height of", "a\\x1b[2J\\u202eb")
     Path("shapes").mkdir()
     Path("shapes/zig.py").write_text(text + '\n__doc__ = "Zig.\\x1b]0;owned\\x07\\x9b31m\\u202e"\n', "utf-8")
     Path("shapes/other.py").write_text(text, "utf-8")
@@ -449,10 +429,8 @@ PLANTED = [
     ("shape", '"Height of the blocks."', '""', "read: zig.py: parameter height_mm has no help"),
     ("shape", "(0.05, 5.0)})\n    film_mm", "(0.5, 5.0)})\n    film_mm", "read: .*default 0.4 is outside its range"),
     ("shape", '"range": (0.5, 50.0)', '"choices": (1, 2)', "read: .*default 4.0 is not among its choices"),
-    ("printer", "  G28\n", "  M999 S1\n", "gcode-command: start and end code, line 3: x has no M999|has no M999"),
     ("printer", "min_layer_mm: 0.05", "min_layer_mm: 0.5", "read: .*min_layer_mm 0.5 is above nozzle_mm 0.4"),
-    ("printer", "max_nozzle_c: 250.0", "max_nozzle_c: 200.0", "profile: no profile for etpu and x60 in 0.1 mm layers"),
-    ("printer", "{etpu: 0, x60: 1}", "{etpy: 0}", "tools: .*unknown material 'etpy'"),
+
     ("material", "low: 0.05, high: 0.5", "low: 0.5, high: 0.05",
      "read: it.yaml, line 12: resistivity_ohm_m of it-sheet has low 0.5 above high 0.05"),
     ("material", "{value: 0.1,", "{value: 0.9,", "line 12: .* is 0.9, outside its own range of 0.05 to 0.5"),
@@ -572,9 +550,8 @@ def test_planted_faults_of_instruments(run, old, new, rule):
     run("new", "instrument", "m-100")
     file = Path("instruments/m-100.yaml")
     assert run("pack", "test", str(file)).code == 0
-    file.write_text(
-        file.read_text(encoding="utf-8").replace(old, new).replace("leads_ohm: 0.2", "leads_ohm: 0.0"), encoding="utf-8"
-    )
+    text = file.read_text("utf-8").replace(old, new)
+    file.write_text(text.replace("leads_ohm: 0.2", "leads_ohm: 0.0"), "utf-8")
     said = run("pack", "test", str(file), "--json")
     assert (said.code, json.loads(said.out)["findings"][0]["rule"]) == (1, rule)
 
@@ -633,11 +610,11 @@ def test_the_commands_of_the_page(run, here):
     assert run("check", "design.yaml").code == 0
 
 
-@pytest.mark.usefixtures("at_rest", "shared_cache")
-@pytest.mark.usefixtures("roughly")
+@pytest.mark.usefixtures("at_rest", "shared_cache", "roughly")
 def test_a_synced_log_is_reported_where_its_shape_is_not_trusted(run, here, monkeypatch):
     """Nothing of it runs; the report is of all else, and names what to trust, by the file's own SHA-256."""
     shape = put(here, "shape", "zig")
+    content = shape.read_bytes()
     Path("z.yaml").write_text("shape: zig\n", "utf-8")
     assert run("log", "specimen", "Z1", "--design", "z.yaml", "--log", "one.db").code == 0
     for name in ("Z1", "23 triX .2mm"):
@@ -646,29 +623,19 @@ def test_a_synced_log_is_reported_where_its_shape_is_not_trusted(run, here, monk
     monkeypatch.setenv(packs.PLACE, str(here / "another"))
     shape.unlink()
     assert run("log", "sync", "share", "--log", "two.db").code == 0
-    words = ("report", "--log", "two.db", "--format", "md", "-o", "r.md")
-    monkeypatch.setattr(shape_files.shape_process, "module_of", lambda *_: pytest.fail("it ran"))
-    said = run(*words)
+    words = ("--log", "two.db", "--format", "md", "-o", "r.md")
+    with monkeypatch.context() as patch:
+        patch.setattr(shape_files.shape_process, "module_of", lambda *_: pytest.fail("it ran"))
+        said = run("report", *words)
     assert said.code == 0
-    text = " ".join(said.out.split())
-    key = sha256((TEMPLATES / "shape.py").read_bytes().replace(b"NAME", b"zig")).hexdigest()
+    text, key = said.words, sha256(content).hexdigest()
     assert "Electrode resistance of 23 triX .2mm: measured 700 ohm" in text
     assert "Not compared: shape of Z1, z: zig.py is not trusted and did not run" in text
     assert f"sensorgen pack trust shapes/zig.py (its file, or the design's that contains it), and again after each " \
            f"change; SHA-256 {key}." in text  # fmt: skip
     assert "another version of sensorgen" not in Path("r.md").read_text("utf-8")
-
-
-@pytest.mark.usefixtures("at_rest", "shared_cache")
-@pytest.mark.usefixtures("roughly")
-def test_a_synced_log_is_reported_whole_once_its_shape_is_trusted(run, here, monkeypatch):
-    shape = put(here, "shape", "zig")
-    Path("z.yaml").write_text("shape: zig\n", "utf-8")
-    run("log", "specimen", "Z1", "--design", "z.yaml", "--log", "one.db")
-    run("log", "add", "Z1", "--y", "0.7k", "--z", "OL", "--log", "one.db")
-    monkeypatch.setenv(packs.PLACE, str(here / "another"))
-    assert "Not compared" in run("report", "Z1", "--log", "one.db", "--format", "md", "-o", "r.md").out
-    assert run("pack", "trust", str(shape.relative_to(here))).code == 0
-    said = run("report", "Z1", "--log", "one.db", "--format", "md", "-o", "r.md").out
+    shape.write_bytes(content)
+    assert run("pack", "trust", "shapes/zig.py").code == 0
+    said = run("report", "Z1", *words).out
     assert said.startswith("Electrode resistance of Z1: measured 700 ohm, predicted")
     assert "Not compared" not in said

@@ -2,13 +2,11 @@
 
 import json
 import re
-from contextlib import contextmanager
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from sensorgen.cli import render
 from sensorgen.core.document import text
 from sensorgen.prediction.sheet_study import SheetStudy
 from sensorgen.solvers.sheet.parts import Sheet, SheetPatch
@@ -37,10 +35,8 @@ def test_json_is_plain_and_holds_the_maps(run):
 
 
 def test_twice_the_noise_is_twice_the_error(run):
-    one, two = (
-        json.loads(run(*WORDS, "--contacts", "corners", "--json", "--noise", noise).out)["contacts"]["corners"]
-        for noise in ("0.1%", "0.2%")
-    )
+    said = (run(*WORDS, "--contacts", "corners", "--json", "--noise", noise) for noise in ("0.1%", "0.2%"))
+    one, two = (json.loads(each.out)["contacts"]["corners"] for each in said)
     assert two["sigma_x_m"][1][2] == pytest.approx(2 * one["sigma_x_m"][1][2], rel=1e-6)
 
 
@@ -74,24 +70,6 @@ def test_a_bonded_film_tells_less_of_force(run):
     assert 0 < bonded < free / 3
 
 
-def test_it_fits_a_terminal(run):
-    said = run(*WORDS, "--contacts", "two-edges", "--pad", "0-10,0-10")
-    assert max(map(len, said.out.splitlines())) <= 80
-
-
-def test_a_bar_moves_with_the_places(run, monkeypatch):
-    """A person is told of every place; without a terminal there is no bar."""
-    steps = []
-
-    @contextmanager
-    def progress(names):
-        yield lambda name: steps.append(names.index(name))
-
-    monkeypatch.setattr(render, "progress", progress)
-    assert run(*WORDS, "--contacts", "opposite").code == 0
-    assert steps == list(range(49))
-
-
 def test_maps_are_drawn(run, tmp_path):
     said = run(*WORDS, "--contacts", "two-edges", "--plot", "maps")
     assert said.code == 0, said.err
@@ -112,7 +90,6 @@ def test_maps_are_drawn(run, tmp_path):
         (["--tip=-1"], "--tip: -1; expected above 0"),
         (["--frequencies", "1kHz,1kHz"], "twice"),
         (["--frequencies", "-1"], "--frequencies"),
-        (["--noise", "much"], "--noise"),
         (["--noise", "0"], "--noise 0; expected a share above 0"),
         (["--noise", "300%"], "--noise 3; expected a share above 0 and below 1"),
         (["--noise", "nan"], "--noise"),
@@ -149,8 +126,7 @@ def test_columns_stay_apart_whatever_the_errors(length_m, words):
         best_tones=lambda: np.array([0]), located=lambda: 1.0, verdict=lambda: "",
     )  # fmt: skip
     sheet = Sheet(0.1, 0.1, (450.0, 450.0), 7e-8)
-    found = SheetStudy(
-        sheet, SheetPatch(0.0, 0.0, 0.01, 0.01, 1.1), {}, {"two-edges": found, "b": found}, 6.0, 1e-3, ()
-    )
+    patch = SheetPatch(0.0, 0.0, 0.01, 0.01, 1.1)
+    found = SheetStudy(sheet, patch, {}, {"two-edges": found, "b": found}, 6.0, 1e-3, ())
     row = next(line for line in text(found.document()) if line.startswith("two-edges  "))
     assert re.split("  +", row) == ["two-edges", "∞", words, words, "100", "100 kHz"]

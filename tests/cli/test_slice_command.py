@@ -25,9 +25,8 @@ def slicer(tmp_path, monkeypatch):
     def write(code=f"open(out, 'w').write('''{GCODE}''')"):
         path = tmp_path / "bin" / "prusa-slicer"
         path.parent.mkdir(exist_ok=True)
-        path.write_text(
-            f"#!{sys.executable}\nimport sys, time\nout = sys.argv[sys.argv.index('--output') + 1]\n{code}\n"
-        )
+        head = f"#!{sys.executable}\nimport sys, time\nout = sys.argv[sys.argv.index('--output') + 1]\n"
+        path.write_text(f"{head}{code}\n")
         path.chmod(0o755)
         monkeypatch.setenv("PATH", f"{path.parent}{os.pathsep}{os.environ['PATH']}")
         return path

@@ -4,13 +4,6 @@ import json
 
 import pytest
 
-from sensorgen import cli
-
-
-@pytest.fixture(autouse=True)
-def _registered(monkeypatch):
-    monkeypatch.setattr(cli, "COMMANDS", tuple(dict.fromkeys((*cli.COMMANDS, "stack"))))
-
 
 def test_it_prints_tables(run):
     said = run("stack", "double", "--isolation", "0.3")
@@ -43,11 +36,6 @@ def test_its_json_is_plain(run):
     assert (found["force_n"], found["position_m"]) == (3.0, pytest.approx(0.045))
     assert [row["frequency_hz"] for row in found["readings_ohm"]][-1] == 99.7e3
     assert {row["wiring"] for row in found["touch"]} == {"top driven", "top at ground", "bridge, either way round"}
-
-
-def test_tones_are_taken_as_typed(run):
-    said = run("stack", "reference", "--frequencies", "10.1kHz,1MHz", "--json")
-    assert [row["frequency_hz"] for row in json.loads(said.out)["readings_ohm"]] == [10.1e3, 1e6]
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from sensorgen.design import design
+from sensorgen.workflows.build import build
+
 SIZE = {"length_mm": 6.0, "width_mm": 6.0}
 BUILD = ("build", "reference", "--size", "6x6", "--no-cad", "--name", "x")
 OLD, NEW = ("--dielectric", "0.6"), ("--dielectric", "0.7")
@@ -21,8 +24,6 @@ pytestmark = pytest.mark.usefixtures("shared_cache")  # what is written counts, 
 @pytest.fixture(scope="module")
 def both(tmp_path_factory):
     """The files of the old build, and those of the new one."""
-    from sensorgen.design import design
-    from sensorgen.workflows.build import build
 
     def files(film):
         data = {"shape": "reference", "name": "x", "parameters": {"dielectric_mm": film, **SIZE}}
@@ -70,35 +71,20 @@ def test_a_forced_short_is_written_whole_and_elsewhere_to_the_same_bytes(run, st
     assert_manifest_verifies(found)
 
 
-def test_missing_parents_are_made(run, tmp_path):
-    assert run(*BUILD, "--out", "a/b/c").code == 0
-    assert (tmp_path / "a/b/c/x/manifest.json").is_file()
-
-
-@pytest.mark.parametrize("out", ["taken", "taken/deeper", "taken/deeper/still"])
+@pytest.mark.parametrize("out", ["x", "x/deeper", "x/deeper/still", ""])  # the last is the design's own folder
 def test_output_folder_is_a_file(run, tmp_path, out):
-    (tmp_path / "taken").write_text("mine")
+    (tmp_path / "x").write_text("mine")
     said = run(*BUILD, "--out", out)
     assert said.code == 2
-    assert "'taken' is a file; expected a folder: move it away, or name another place with --out" in said.line
-    assert (tmp_path / "taken").read_text() == "mine"
+    assert "'x' is a file; expected a folder: move it away, or name another place with --out" in said.line
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("x", "mine")]
 
 
-def test_the_designs_own_folder_is_a_file(run, tmp_path):
-    (tmp_path / "x").write_text("mine")
-    assert "'x' is a file" in run(*BUILD, "--out", "").line
-    assert [p.name for p in tmp_path.iterdir()] == ["x"]
-
-
-def test_output_folder_is_a_link_that_leads_nowhere(run, tmp_path):
-    (tmp_path / "out").symlink_to("nowhere")
+def test_output_folder_is_a_link(run, tmp_path):
+    (tmp_path / "out").symlink_to("real")
     assert "'out' is a link that leads nowhere" in run(*BUILD).line
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
-
-
-def test_a_link_to_a_folder_is_followed(run, tmp_path):
     (tmp_path / "real").mkdir()
-    (tmp_path / "out").symlink_to("real")
     assert run(*BUILD).code == 0
     assert (tmp_path / "real/x/manifest.json").is_file()
 
@@ -109,12 +95,6 @@ def test_output_folder_that_cannot_be(run, tmp_path, out):
     assert said.code == 2
     assert "name another place with --out" in said.line
     assert not any(p.name.endswith(".part") for p in tmp_path.rglob("*"))
-
-
-def test_a_name_that_only_the_file_system_knows_is_printed(run, tmp_path):
-    said = run(*BUILD, "--out", "ö\udcff")
-    assert said.code in (0, 2)  # written, and said as well as the terminal can
-    assert "Traceback" not in said.err
 
 
 def test_read_only(run, disk, contents, both):
@@ -135,9 +115,7 @@ def test_disk_full(run, disk, contents, both):
     before = contents(place)
     said = run(*BUILD, *NEW, "--out", place)
     assert said.code == 2
-    assert (
-        said.line == f"sensorgen: cannot write to '{place}/x': No space left on device; name another place with --out"
-    )
+    assert said.line.endswith(f"cannot write to '{place}/x': No space left on device; name another place with --out")
     assert contents(place) == before
     assert sorted(p.name for p in place.iterdir()) == ["filler", "x"]
 

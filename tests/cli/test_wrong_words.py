@@ -64,13 +64,10 @@ def test_wrong_name(run, words, message):
 SIZES = [
     (["--period=-2"], "period_mm is -2; expected a number from 0.1 to 100 mm"),
     (["--period", "0"], "period_mm is 0; expected"),
-    (["--period", "1e400"], "--period: '1e400' is not a length"),
     (["--set", "period_mm=nan"], "period_mm is 'nan'; expected a number from 0.1 to 100 mm"),
     (["--period", "nan"], "--period: 'nan' is not a length"),
-    (["--period", "inf"], "--period: 'inf' is not a length"),
     (["--period", "2 inch"], "--period: '2 inch' is not a length: write a number, with mm, um, cm or m"),
     (["--length", "1e9"], "length_mm is 1e+09; expected a number from 1 to 1000 mm"),
-    (["--length", "1km"], "'1km' is not a length"),
     (["--dielectric=-0.1"], "dielectric_mm is -0.1; expected a number from 0 to 10 mm"),
     (["--electrode", "0"], "electrode_mm is 0; expected a number from 0.01"),
     (["--size", "50"], "--size '50': expected LENGTHxWIDTH, as in 100x10"),
@@ -98,10 +95,8 @@ def test_a_swarm_of_cells_is_refused_before_it_fills_the_memory(run):
 
 
 def test_a_stack_of_layers_is_refused_before_it_fills_the_memory(run, tmp_path):
-    fine = (
-        "title: t\nsource: s\nlayer_mm: 1e-9\nfirst_layer_mm: 1e-9\ninfill_pattern: grid\ntravel_speed_mm_s: 1\n"
-        "bridge_warning_mm: 1\nbridge_error_mm: 2\n"
-    )
+    fine = "title: t\nsource: s\nlayer_mm: 1e-9\nfirst_layer_mm: 1e-9\ninfill_pattern: grid\n"
+    fine += "travel_speed_mm_s: 1\nbridge_warning_mm: 1\nbridge_error_mm: 2\n"
     (tmp_path / "thin.yaml").write_text(fine)
     said = run("check", "tri", "--quality", "thin.yaml")
     assert said.code == 2
@@ -137,24 +132,11 @@ def test_too_large_for_the_bed(run, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_too_large_for_the_bed_but_not_for_another(run):
-    assert run("check", "reference", "--size", "330x330", "--printer", "prusa-xl5").code == 0
-
-
 def test_a_short_is_an_error_and_nothing_is_written(run, tmp_path):
     said = run("build", "tri", "--dielectric", "0", "--no-cad")
     assert said.code == 1
     assert "the electrodes touch: a short by design; nothing was written (--force" in said.line
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_film_under_half_a_layer_is_an_error(run):
-    said = run("check", "tri", "--dielectric", "0.049")
-    assert (said.code, said.err) == (1, "")
-    assert said.out.startswith("CHANGE")
-    assert "error    2-film" in said.out
-    assert "0.049 mm" in said.out
-    assert "error    2-film" not in run("check", "tri", "--dielectric", "0.051").out
 
 
 def test_strict_makes_a_warning_fatal(run, tmp_path):
@@ -184,3 +166,9 @@ def test_nan_is_within_no_range(run, words):
     said = run(*words)
     assert (said.code, said.out) == (2, "")
     assert "nan is not a number" in said.line
+
+
+def test_a_sensor_that_reaches_where_the_prime_tower_stands_is_warned_of(run):
+    said = run("check", "reference", "--size", "330x330", "--printer", "prusa-xl5")
+    assert said.code == 0
+    assert "it reaches into the far right corner, where the prime tower of" in said.words

@@ -39,7 +39,8 @@ def test_warnings_name_what_is_missing():
     assert any("no G90" in f.message for f in check(LAB.splitlines(), DIABASE).findings)
 
 
-# Text of the good file, the line to change, what to make of it, the rule that must refuse it.
+# Text of the good file, the line to change, what to make of it, the rule that must refuse it; what is not planted in
+# a slicer's file by tests/slicers/planted.py.
 PLANTED = [
     ("reach", OWN, "G1 X5 Y5 F7200", "G1 X209 Y5 F7200"),
     ("reach", OWN, "G1 X5 Y5 F7200", "G1 X-208.1 Y5 F7200"),
@@ -51,107 +52,50 @@ PLANTED = [
     ("bed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X196 Y5 E.2 F1200"),
     ("bed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y-86 E.2 F1200"),
     ("bed", OWN, "G1 Z.2 F3000", "G1 Z205 F3000"),
-    ("below", OWN, "G1 Z.2 F3000", "G1 Z.05 F3000"),
     ("below", OWN, "G1 Z.2 F3000", "G28\nG32\nG1 Z.05 F3000"),
-    ("wait", OWN, "M116\nT3\nM116 P3", "T3"),
+    ("below", OWN, "G1 Z.2 F3000", "G92 E0\nG1 Z.05 F3000"),
     ("below", MAKER, "G1 Z.4 F3000", "G1 Z0.100 F3000"),
-    ("cold", OWN, "G10 P4 S230 R180", ""),
     ("cold", OWN, "G10 P4 S230 R180", "G10 P4 R180"),
     ("cold", OWN, "M568 P4 A2", "G10 P4 S120"),
-    ("cold", OWN, "M116 P4", "M568 P4 A0"),
     ("cold", OWN, "M116 P4", "M568 P4 A0\nG10 P4 S230"),
     ("cold", OWN, "M568 P4 A2", "M104 T4 S0"),
     ("cold", MAKER, "G10 P4 R184 S228", "G10 P5 R184 S228"),
     ("cold", LAB, "G10 P1 R175 S200", "G10 P2 R175 S200"),
-    ("tool", OWN, "T4", "T6"),
     ("tool", OWN, "T4", "T0"),
     ("tool", OWN, "T3", ""),
-    ("tool", OWN, "G10 P4 S230 R180", "G10 P0 S230 R180"),
     ("tool", OWN, "M568 P4 A2", "M568 P7 A2"),
     ("tool", OWN, "M568 P4 A2", "M109 T0 S230"),
     ("tool", OWN, "M116 P4", "M116 P9"),
     ("tool", MAKER, 'M98 P"tprime4.g" ; tool change', 'M98 P"tprime6.g" ; tool change'),
     ("tool-change", MAKER, 'M98 P"tprime4.g" ; tool change', 'T4\nM98 P"tprime4.g"'),
     ("tool-change", OWN, "T4", 'M98 P"tprime4.g"\nG1 X3 F600\nT4'),
-    ("absolute-e", OWN, "M83", "M82"),
-    ("absolute-e", OWN, "M83", ""),
     ("absolute-e", OWN, "M501", "M82"),
     ("temperature", OWN, "G10 P4 S230 R180", "G10 P4 S251 R180"),
     ("temperature", OWN, "G10 P4 S230 R180", "G10 P4 S230 R260"),
     ("temperature", OWN, "M568 P4 A2", "M104 T4 S300"),
-    ("temperature", OWN, "M568 P4 A2", "M104 S230"),
     ("temperature", OWN, "M568 P4 A2", "M109 S230"),
     ("temperature", OWN, "M190 S75 ; set bed temperature", "M190 S121"),
     ("temperature", LAB, "M140 S60", "M140 S121"),
-    ("home", OWN, "G28\nG32", "G32"),
     ("home", OWN, "G28\nG32", "G32\nG28"),
-    ("home", OWN, "G28\nG32", "G1 X5\nG28\nG32"),
+    ("home", LAB, "G28\nG32", "G28 X Y\nG29"),
+    ("home", OWN, "T4", "M84\nT4"),
+    ("home", OWN, "T4", "M18 Y\nT4"),
     ("z", OWN, "G1 X0 Y20 Z.1 F7200", "G1 X0 Y20 F7200"),
     ("z", MAKER, "G1 Z.4 F3000", "G91\nG1 Z0\nG90"),
-    ("home", LAB, "G28\nG32", "G28 X Y\nG29"),
-    ("level", LAB, "G32", ""),
-    ("level", OWN, "G32", "G28"),
-    ("speed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y5 E.2 F12001"),
     ("speed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y5 Z9 E.2 F9000"),
     ("speed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X5.1 Y5 E.2 F6000"),
-    ("speed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y5 E.2 F0"),
     ("heat-left", OWN, "G10 P4 S0 R0", "M84\nM30"),
     ("heat-left", MAKER, "M0 H1", "M84"),
     ("purge", LAB, "G1 E15.000 F1800", "G1 E15.1 F1800"),
     ("purge", OWN, "G1 E-4.7 F2400", "G1 E-25 F2400"),
-    ("end", OWN, "T4", "T4\nM0"),
     ("macro", MAKER, "G32", 'G32\nM98 P"mine.g"'),
-    ("relative", MAKER, "G90", "G91"),
     ("relative", MAKER, "G1 X180 Y85 Z200 F12000 ; End", "G91"),
-    ("command", OWN, "T4", "T4\nM221 S95"),
+    ("pause", OWN, "T4", "T4\nM226"),
     ("command", OWN, "T4", "T4\nM221 D1 S105\nM221 D0 S100"),
-    ("command", OWN, "G54", "G55"),
-    ("command", OWN, "G54", "G59.3"),
-    ("command", OWN, "G54", "G10 L2 P1 X10"),
-    ("command", OWN, "G54", "G10 L20 P1 X0 Y0"),
     ("command", OWN, "T4", "G10 P4 Z-0.3\nT4"),
-    ("command", OWN, "T4", "T4\nG68 X0 Y0 R30"),
-    ("command", OWN, "T4", "T4\nM579 X1.01 Y1.01"),
-    ("command", OWN, "T4", "T4\nM556 S100 X0.5"),
-    ("command", OWN, "T4", "T4\nM206 Z-0.2"),
-    ("command", OWN, "T4", "T4\nM92 E840"),
-    ("command", OWN, "T4", "T4\nM200 D1.75"),
-    ("command", OWN, "T4", "T4\nM563 P4 D0 H1"),
-    ("command", OWN, "T4", "T4\nM564 S0 H0"),
-    ("command", OWN, "T4", "T4\nM567 P4 E0.5:0.5"),
-    ("command", OWN, "T4", "T4\nM592 D1 A0.01 B0.001"),
-    ("command", OWN, "T4", "T4\nM669 K1"),
-    ("command", OWN, "T4", "T4\nG93"),
-    ("command", OWN, "T4", "T4\nM37 S1"),
-    ("command", OWN, "T4", "T4\nM28 other.g"),
-    ("command", OWN, "T4", "T4\nM453"),
-    ("command", OWN, "T4", "T4\nM112"),
-    ("command", OWN, "G28", "M999"),
-    ("command", OWN, "T4", "T4\nM81"),
-    ("command", OWN, "T4", "T4\nM99"),
-    ("command", OWN, "T4", "T4\nM2"),
-    ("command", OWN, "T4", "M32 other.g\nT4"),
-    ("command", OWN, "T4", 'M701 S"etpu"\nT4'),
-    ("command", OWN, "T4", "T4\nG92 X100"),
-    ("command", OWN, "T4", "T4\nM220 S150"),
-    ("command", OWN, "T4", "T4 P0"),
-    ("command", OWN, "T4", "T4\nM121"),
-    ("command", OWN, "T4", "T4\nM500"),
-    ("command", OWN, "T4", "T4\nM303 H1 S200"),
-    ("command", OWN, "T4", "T4\nM290 S0.3 R0"),
-    ("home", OWN, "T4", "M84\nT4"),
-    ("home", OWN, "T4", "M18 Y\nT4"),
-    ("command", OWN, "T4", "M561\nT4"),
-    ("command", OWN, "T4", "T4\nG5 X10 Y10 I1 J1 P1 Q1"),
-    ("read", OWN, "G1 X5 Y5 F7200", "G1 X5 I5 F7200"),
-    ("read", OWN, "G1 X5 Y5 F7200", "G1 R1 X5 Y5 F7200"),
-    ("read", OWN, "G1 X5 Y5 F7200", "G1 H2 X5 Y5 F7200"),
-    ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Ynan E.2 F1200"),
     ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X-nan Y5 E.2 F1200"),
     ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y5 E.2 F1200 \N{DEGREE SIGN}"),
     ("read", OWN, "M116", "M117 Gr\N{LATIN SMALL LETTER U WITH DIAERESIS}n"),
-    ("read", OWN, "G1 X15 Y5 E.2 F1200", "X15 Y5 E.2"),
-    ("read", OWN, "G1 X15 Y5 E.2 F1200", "G2 X15 Y5 E.2"),
     ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X\N{ARABIC-INDIC DIGIT FIVE} E.2"),
 ]  # fmt: skip
 
@@ -165,12 +109,6 @@ def test_a_planted_fault_is_refused(rule, text, old, new):
     faults = [f for f in result.errors() if f.rule == rule]
     assert faults, [f.rule for f in result.findings]
     assert all(f.message and f.advice and 1 <= f.line <= len(lines) for f in faults)
-
-
-def test_a_finding_names_the_line():
-    lines = changed(OWN, "G1 X15 Y5 E.2 F1200", "G1 X196 Y5 E.2 F1200")
-    (fault,) = check(lines, DIABASE).errors()
-    assert lines[fault.line - 1] == "G1 X196 Y5 E.2 F1200\n"
 
 
 @pytest.mark.parametrize(
@@ -246,15 +184,6 @@ def test_a_tool_that_still_waits_warm_is_left_on():
     assert (fault.rule, "tools 4 are" in fault.message) == ("heat-left", True)
 
 
-def test_heaters_left_to_the_stop_macro_are_told():
-    assert ("heat-left", "info") in found(MAKER.splitlines())
-    assert not any(rule == "heat-left" for rule, _ in found(OWN.splitlines()))
-
-
-def test_heights_count_anew_only_where_z_is_named():
-    assert "below" in errors(changed(OWN, "G1 Z.2 F3000", "G92 E0\nG1 Z.05 F3000"))
-
-
 def test_a_refused_command_says_why_and_where():
     result = check(changed(OWN, "M501", "M501\nM203 X90000 Y90000\nM777"), DIABASE)
     line = OWN.splitlines().index("M501") + 2
@@ -275,32 +204,20 @@ def test_a_printers_file_changes_the_list(line):
     assert "command" in errors(OWN.splitlines(), none)
 
 
-def test_a_pause_between_printed_lines_is_refused_and_one_before_them_is_told():
-    assert "pause" in errors(changed(OWN, "T4", "T4\nM226"))
+def test_what_stops_or_is_left_on_before_and_after_the_print_is_told():
     assert ("pause", "info") in found(changed(OWN, "M116", "M25"))
+    assert ("heat-left", "info") in found(MAKER.splitlines())  # left to the stop macro
 
 
-@pytest.mark.parametrize(
-    ("line", "rule", "severity"),
-    [
-        ("M290 S0.05 R0", "height", "warning"), ("M290 S0", "height", "warning"),
-    ],
-)  # fmt: skip
-def test_what_may_be_meant_is_told(line, rule, severity):
-    assert (rule, severity) in found(changed(OWN, "T4", f"T4\n{line}"))
-    assert errors(changed(OWN, "T4", f"T4\n{line}")) == set()
+@pytest.mark.parametrize("line", ["M290 S0.05 R0", "M290 S0"])
+def test_a_height_that_may_be_meant_is_warned_of(line):
+    assert found(changed(OWN, "T4", f"T4\n{line}")) == {("height", "warning")}
 
 
 def test_a_file_without_its_end_is_warned_of():
     result = check([line for line in OWN.splitlines() if line != "M0 H1"], DIABASE)
     assert [(f.rule, f.severity) for f in result.findings] == [("end", "warning")]
     assert "M0 or M1" in result.findings[0].message
-
-
-def test_many_of_a_kind_are_one_finding():
-    lines = [*changed(OWN, "T4", "T4"), *["G1 X300 F600\n"] * 500]
-    (fault,) = [f for f in check(lines, DIABASE).findings if f.rule == "reach"]
-    assert fault.count == 500
 
 
 def test_the_first_line_of_a_kind_is_named():

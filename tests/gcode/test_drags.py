@@ -29,16 +29,9 @@ COMB = ["G21", "G90", "M83", "G28", "T3", "G1 Z0.1 F3000"] + [
     line for k in range(10) for line in (f"G1 X0 Y{k} F7200", f"G1 X20 {e(20)} F1200")
 ]
 OVER = [
-    "G1 X25 F7200",
-    "G1 Y-3",
-    "G1 E-2 F2400",
-    "T4",
-    "G1 E-3 F2400",
-    "G1 X10 Y-3 F7200",
-    "G1 Y12",
-    "G1 E3 F2400",
+    "G1 X25 F7200", "G1 Y-3", "G1 E-2 F2400", "T4", "G1 E-3 F2400", "G1 X10 Y-3 F7200", "G1 Y12", "G1 E3 F2400",
     f"G1 X15 {e(5)} F1200",
-]
+]  # fmt: skip
 
 
 def sums(lines, machine=DIABASE):
@@ -167,9 +160,8 @@ def test_a_lifted_travel_of_up_to_2_mm_over_other_lines_draws_nothing_back(y, re
 
 def test_heights_in_travels_move_to_the_way_down():
     """CuraEngine changes layers while it travels."""
-    made, _ = assert_lifted(
-        [*COMB, *OVER[:2], "T4", "G0 F7200 X10 Y-3", "G0 F600 X10 Y12 Z0.2", f"G1 F1200 X15 {e(5)}"]
-    )
+    travels = ["T4", "G0 F7200 X10 Y-3", "G0 F600 X10 Y12 Z0.2", f"G1 F1200 X15 {e(5)}"]
+    made, _ = assert_lifted([*COMB, *OVER[:2], *travels])
     place = made.index("G0 F600 X10 Y12")
     assert (made[place - 1], made[place + 1]) == ("G1 Z0.4 F3000", "G1 Z0.2 F3000")
 
@@ -237,10 +229,9 @@ def test_insulation_left_by_a_strand_on_a_plate():
     height, tools = design.printed.size_mm[2], {"etpu": 3, "x60": 4}
     lines = ["M83", "G90"]
     for z in design.layers.boundaries_mm(height)[1:]:
-        body = next(
-            b for b in design.printed.bodies if any(p.span("z")[0] < z - 0.01 < p.span("z")[1] for p in b.pieces)
-        )
-        lines += [f"T{tools[body.material]}", f"G1 Z{z}"]
+        (material,) = {b.material for b in design.printed.bodies for low, high in (b.pieces[0].span("z"),)
+                       if low < z - 0.01 < high}  # fmt: skip
+        lines += [f"T{tools[material]}", f"G1 Z{z}"]
         for k in range(24):
             lines += [f"G1 X-9.8 Y{-4.8 + k * 9.6 / 23:.3f}", f"G1 X9.8 {e(19.6, 0.44)}"]
     found = strands.drags(design, lines).strands

@@ -54,12 +54,6 @@ def test_layers_by_height_where_no_comment_counts():
     assert paths.read([*lines[:4], "G1 X2 Z.2 E1"], DIABASE).layer.tolist() == [1, 2]
 
 
-def test_a_file_with_carriage_returns(tmp_path):
-    path = tmp_path / "a.gcode"
-    path.write_bytes("\r\n".join(PRUSA).encode())
-    assert paths.read(path, DIABASE).filament_mm.tolist() == [0.5, 0.25, 0.1, 0.5]
-
-
 @pytest.mark.parametrize(
     ("content", "said"),
     [(b"GCDE\1\0", "binary G-code"), (b"G28\n\0\0", "no text"), (b" \n", "is empty"), (b"PK\3\4", "zip archive")],

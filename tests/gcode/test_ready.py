@@ -165,11 +165,6 @@ def test_line_by_line_for_cura():
     assert new.count("G10 P3 S0 R0") == new.count("G10 P4 S0 R0") == 1
 
 
-def test_the_first_tool_waits_until_the_axes_are_homed():
-    new = made(CURA).splitlines()
-    assert new.index("G32") < new.index("T3") < new.index("G1 F2400 E-4.7")
-
-
 def test_the_next_tool_is_heated_in_time():
     lines = ["G28", "M83", "T2", "G10 P2 S210", "G10 P3 S230"]
     lines += [f"G1 X{x} E1 F60" for x in range(1, 61)]  # one second each
@@ -184,14 +179,8 @@ def test_the_next_tool_is_heated_in_time():
 
 def test_heights_of_tools():
     new = made(PRUSA, with_control(tool_offsets_mm={4: -0.05})).splitlines()
-    assert [line for line in new if line.startswith(("T", "M290"))] == [
-        "T3",
-        "M290 S0 R0",
-        "T4",
-        "M290 S-0.05 R0",
-        "T3",
-        "M290 S0 R0",
-    ]
+    of_tools = [line for line in new if line.startswith(("T", "M290"))]
+    assert of_tools == ["T3", "M290 S0 R0", "T4", "M290 S-0.05 R0", "T3", "M290 S0 R0"]
     assert "M290" not in made(PRUSA)
     both = with_control(tool_offsets_mm={3: 0.1, 4: 0.1})
     assert made(PRUSA, both).count("M290 S0.1 R0") == 1

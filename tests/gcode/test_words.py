@@ -2,7 +2,7 @@
 
 import pytest
 
-from sensorgen.export.gcode.words import Command, GcodeLine, parse
+from sensorgen.export.gcode.words import parse
 
 
 def commands(text: str) -> list[tuple[str, dict[str, str]]]:
@@ -52,21 +52,6 @@ def test_what_a_line_says(text, expected):
 )
 def test_what_cannot_be_read_is_said(text, fault):
     assert any(fault in said for said in parse(text).faults)
-
-
-def test_numbers_of_words():
-    command = parse("G10 P3 S210:205 Rnan X{x}").commands[0]
-    assert (command.number("P"), command.number("S"), command.number("Z")) == (3.0, 210.0, None)
-    assert command.number("R") != command.number("R")
-    assert command.number("X") != command.number("X")
-    assert command.has("ZX")
-    assert not command.has("ZY")
-
-
-def test_remarks_are_kept():
-    assert parse("G1 X1 ;TYPE:Skirt").remark == "TYPE:Skirt"
-    assert parse("(hello)") == GcodeLine((), "hello")
-    assert parse("T1").commands == (Command("T1"),)
 
 
 def test_long_lines_take_no_long_time():

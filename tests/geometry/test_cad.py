@@ -9,7 +9,9 @@ import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -122,23 +124,17 @@ def test_submit_does_not_wait(pretend: Callable[[str], None], tmp_path: Path) ->
     assert job.done()  # leaving ended it, with a minute of it still to come
 
 
-def test_no_trace_is_left(pretend: Callable[[str], None]) -> None:
+@pytest.mark.parametrize("ends", [nullcontext(), pytest.raises(KeyboardInterrupt)], ids=["at its end", "by an error"])
+def test_no_trace_is_left(pretend: Callable[[str], None], ends: Any) -> None:
     pretend("import time; time.sleep(60)")
     threads = set(threading.enumerate())
-    with CadProcess() as process:
-        pid = process.pid
-    with pytest.raises(ChildProcessError):  # fetched, so no zombie
-        os.waitpid(pid, 0)
-    assert set(threading.enumerate()) <= threads
-
-
-def test_no_trace_is_left_by_an_error(pretend: Callable[[str], None]) -> None:
-    pretend("import time; time.sleep(60)")
     process = CadProcess()
-    with pytest.raises(KeyboardInterrupt), process:
-        raise KeyboardInterrupt
-    with pytest.raises(ChildProcessError):
+    with ends, process:
+        if not isinstance(ends, nullcontext):
+            raise KeyboardInterrupt
+    with pytest.raises(ChildProcessError):  # fetched, so no zombie
         os.waitpid(process.pid, 0)
+    assert set(threading.enumerate()) <= threads
 
 
 @posix

@@ -118,10 +118,5 @@ def test_crossed_strips_are_one_shell_and_separate_strips_are_many():
     assert second_program(mesh(scene.body("hanging_dielectric"))).body_count == 2  # one per period over the width
 
 
-def test_mesh_volume_is_exact_far_from_the_origin():
-    body = Body("cube", "x60", (box(1e6, 1e6 + 1, 1e6, 1e6 + 1, 1e6, 1e6 + 1),))
-    assert mesh(body).volume_mm3() == pytest.approx(1.0, rel=1e-12)
-
-
 def test_an_empty_mesh_has_no_volume():
     assert Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)).volume_mm3() == 0.0

@@ -165,15 +165,6 @@ def test_an_l_lands_in_its_place(kernel: ModuleType, axis: str) -> None:
     assert not made.is_inside(in_space(axis, 2.0, 1.5, 11.0))
 
 
-@pytest.mark.parametrize("axis", "xyz")
-def test_faces_look_outwards(kernel: ModuleType, axis: str) -> None:
-    made = solids.solid(Prism(axis, L_OUTLINE, 10.0, 12.0))
-    for face in made.faces():
-        at = face.center()
-        assert made.is_inside(at - face.normal_at(at) * 1e-3)
-        assert not made.is_inside(at + face.normal_at(at) * 1e-3)
-
-
 def test_an_inside_out_solid_would_have_a_negative_volume(kernel: ModuleType) -> None:
     made = solids.solid(Prism("y", L_OUTLINE, 10.0, 12.0))
     assert kernel.Solid(made.wrapped.Reversed()).volume == pytest.approx(-8.0)
@@ -274,14 +265,6 @@ def colour_blocks(bodies: list[tuple[int, str]]) -> bytes:
         lines.append(f"#{number + 1} = STYLED_ITEM('color',(#{shared}),#{context + 3});\n")
         lines += [f"#{number + 2} = COLOUR_RGB('',{colour},0.,0.);\n"] if shared == number + 2 else []
     return "".join(lines).encode()
-
-
-def test_equal_bytes_from_file_to_file(kernel: ModuleType, tmp_path: Path) -> None:
-    rect = registry.load(shapes, "rect")
-    scene = rect.scene(rect.Params(length_mm=5.3), Fill(support="bvoh"))
-    for name in "ab":
-        solids.write_step(scene, colours(scene), "t", tmp_path / name)
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
 def test_no_folder_no_colour_no_body(kernel: ModuleType, tmp_path: Path) -> None:

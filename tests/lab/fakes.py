@@ -35,7 +35,6 @@ class Mechanism:
     speed_mm_s: float = SPEED_MM_S
     force_n: float = 0.0  # what the motor is set to
     device_limit_n: float = 1e9
-    surge_n: float = 0.0  # a fault: the motor's amplifier adds it
     limit_n: float = 7.0
     worst_n: float = 0.0
     above_s: float = 0.0
@@ -63,7 +62,7 @@ class Mechanism:
             deepest = self.surface_mm() + self.force_n / STIFF_N_MM
             self.extension_mm = min(wanted, max(deepest, 0.0)) if wanted > self.extension_mm else wanted
         elif self.on and self.mode == "push":
-            motor = min(self.force_n, self.device_limit_n) + self.surge_n
+            motor = min(self.force_n, self.device_limit_n)
             goal = self.surface_mm() + max(motor, 0.0) / STIFF_N_MM if motor > 0 else self.extension_mm
             self.extension_mm = _towards(self.extension_mm, goal, 50.0 * dt)
         self.extension_mm = min(self.extension_mm, STROKE_MM)
@@ -88,8 +87,6 @@ class _Device:
     def __init__(self, plant: Mechanism, clock) -> None:
         self.plant, self.clock = plant, clock
         self.dead = False  # answers nothing and does nothing
-        self.stranger = False
-        self.closed = False
 
     def _message(self, what: str) -> None:
         self.plant.advance(self.clock.now())
@@ -100,17 +97,14 @@ class _Device:
 
     def identify(self) -> Identity:
         self._message("identify")
-        if self.stranger:
-            raise DeviceFault(f"{self.name}: a kettle; expected a {self.name}")
         return Identity(f"fake {self.name}", "1")
 
     def close(self) -> None:
-        self.closed = True
+        """Nothing to close."""
 
 
 class FakeActuator(_Device):
     name = "actuator"
-    nan = False
     deaf = False  # answers, but obeys nothing
 
     def watch(self, seconds: float) -> None:
@@ -134,8 +128,6 @@ class FakeActuator(_Device):
 
     def read(self) -> Extension:
         self._message("read")
-        if self.nan:
-            return Extension(self.clock.now(), float("nan"), float("nan"))
         return Extension(self.clock.now(), self.plant.load_n(), self.plant.extension_mm)
 
     def lift(self) -> None:
@@ -184,8 +176,6 @@ class FakeImpedance(_Device):
 
     name = "impedance"
     rate_hz = 20.0
-    scale = 1.0  # 0 is a short, 1e6 an open circuit
-    nan = clipped = silent = False
 
     def start(self, tones_hz, voltage_v: float) -> None:
         self._message("start")
@@ -196,16 +186,11 @@ class FakeImpedance(_Device):
         self._message("read")
         due = int((self.clock.now() - self.begun) * self.rate_hz)
         count, self.given = due - self.given, due
-        if self.silent:
-            count = 0
         c = 60e-12 * (1 + 0.02 * self.plant.load_n())
         z = 3000 + 1 / (2j * np.pi * self.tones * c)
-        z = np.where(self.scale == 0, 20.0 + 0j, z * max(self.scale, 1e-3))
         rows = np.tile(z, (count, 1)) * (1 + 1e-4 * self.rng.standard_normal((count, len(z))))
-        if self.nan:
-            rows[:] = complex("nan+nanj")
         times = self.begun + (due - count + 1 + np.arange(count)) / self.rate_hz
-        return Readings(times, rows, np.full(count, self.clipped))
+        return Readings(times, rows, np.zeros(count, bool))
 
     def stop(self) -> None:
         self._message("stop")

@@ -18,8 +18,6 @@ from sensorgen.measure.virtual.reprap import RepRapFirmware
 from sensorgen.measure.virtual.scpi import SimulatedLcrMeter
 from sensorgen.measure.virtual.smac import SmacController
 
-DOWN_MM = 1.0
-
 
 def main() -> None:
     reprap._HOMING_MM_S = 200.0  # so that a run begins to press sooner

@@ -12,16 +12,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.measure.lab.devices import Clock
-from sensorgen.measure.virtual.handyscope import (
-    BITS,
-    INPUT_LSB,
-    RANGES_V,
-    RATE_HZ,
-    SERIAL,
-    WINDOW_S,
-    Analyser,
-    Windows,
-)
+from sensorgen.measure.virtual.handyscope import BITS, INPUT_LSB, RANGES_V, RATE_HZ, SERIAL, WINDOW_S, Analyser, Windows
 from sensorgen.measure.virtual.plant import Plant
 
 KEPT = 100  # windows that the device keeps before it loses samples

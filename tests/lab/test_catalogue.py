@@ -43,11 +43,6 @@ def test_each_kind_has_a_driver_and_a_simulator_that_know_each_other(name, role)
     assert catalogue.kind(name).role == role
     assert made.driver.identify().model
     made.driver.close()
-    made = catalogue.simulated(name, SpringPlant(), {}, SimulatedClock())
-    made.simulator.fault = "identity"
-    with pytest.raises(DeviceFault):
-        made.driver.identify()
-    assert len(made.simulator.heard) <= 2
 
 
 def test_settings_reach_simulator_and_driver():

@@ -73,11 +73,6 @@ def test_the_stage_is_raised_where_the_actuator_fails(quick):
     assert quick(Driver("lift"), Driver()) == {"actuator": "no answer to lift", "stage": "raised"}
 
 
-def test_orders_are_read_as_they_were_written(tmp_path):
-    orders = guardian.Orders(devices=DEVICES, dead_man_s=1.5, folder=str(tmp_path))
-    assert guardian.Orders.model_validate_json(orders.model_dump_json()) == orders
-
-
 def _report(folder):
     file = folder / guardian.REPORT
     return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []

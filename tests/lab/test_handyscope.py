@@ -31,10 +31,21 @@ class Capacitor:
         return self.ohm + 1 / (2j * np.pi * hz * self.farad * (1 + self.rise_per_s * self.time_s))
 
 
-def rig(plant=None, analyser=None, bridge=None):
+def rig(plant=None, analyser=None, bridge=None, *, started=True):
     clock = SimulatedClock()
     scope = SimulatedScope(plant or Capacitor(), clock, analyser or Analyser())
-    return clock, scope, Handyscope(str(SERIAL), clock, bridge=bridge, library=scope)
+    meter = Handyscope(str(SERIAL), clock, bridge=bridge, library=scope)
+    if started:
+        meter.start(TONES, 1.0)
+    return clock, scope, meter
+
+
+def phasors(plant=None, analyser=None):
+    """The faster meter, started."""
+    clock = SimulatedClock()
+    meter = PhasorMeter(plant or Capacitor(), clock, analyser or Analyser())
+    meter.start(TONES, 1.0)
+    return clock, meter
 
 
 def follow(clock, meter, seconds, period_s=0.01):
@@ -63,7 +74,6 @@ def test_an_impedance_comes_back(gain):
     """The plant's closed form, through waveform, bridge, converter and demodulation."""
     pairs = tuple((f, gain) for f in TONES_HZ)
     clock, _, meter = rig(analyser=Analyser(noise_a=1e-12, gain=pairs), bridge=Bridge(gain=pairs))
-    meter.start(TONES, 1.0)
     times, impedance, clipped, lost = follow(clock, meter, 2)
     expected = Capacitor().impedance(TONES)
     assert len(times) == 190
@@ -77,7 +87,6 @@ def test_an_impedance_comes_back(gain):
 def test_times_are_exact_and_each_window_sees_the_specimen_of_its_time():
     plant = Capacitor(ohm=0, rise_per_s=0.5)
     clock, _, meter = rig(plant, SILENT)
-    meter.start(TONES, 1.0)
     times, impedance, *_ = follow(clock, meter, 1)
     assert times[0] == pytest.approx(0.055)  # the first block is left out
     assert np.diff(times) == pytest.approx(0.01)
@@ -87,7 +96,6 @@ def test_times_are_exact_and_each_window_sees_the_specimen_of_its_time():
 
 def test_the_clock_of_the_device_may_be_fast():
     clock, _, meter = rig(analyser=Analyser(skew_ppm=5000))
-    meter.start(TONES, 1.0)
     times, *_, lost = follow(clock, meter, 25, 0.05)
     assert times[-1] == pytest.approx(25 * 1.005, abs=0.08)
     assert lost == 0
@@ -96,7 +104,6 @@ def test_the_clock_of_the_device_may_be_fast():
 def test_relative_noise_follows_from_the_weights():
     """White current noise and a capacitor: 1 / (weight x frequency)."""
     clock, _, meter = rig(Capacitor(ohm=0))
-    meter.start(TONES, 1.0)
     _, impedance, *_ = follow(clock, meter, 20)
     noise = impedance.std(axis=0) / abs(impedance.mean(axis=0))
     assert len(impedance) > 1900
@@ -128,13 +135,9 @@ def test_a_signal_beyond_its_range_is_marked_by_both():
     for output in (0.79, 0.81):
         plant = Capacitor(ohm=2610 / output, farad=1)
         clock, _, meter = rig(plant, SILENT)
-        meter.start(TONES, 1.0)
         clipped = follow(clock, meter, 1)[2]
         assert clipped.all() if output > 0.8 else not clipped.any()
-        clock = SimulatedClock()
-        fast = PhasorMeter(plant, clock, SILENT)
-        fast.start(TONES, 1.0)
-        assert follow(clock, fast, 1)[2].all() == (output > 0.8)
+        assert follow(*phasors(plant, SILENT), 1)[2].all() == (output > 0.8)
 
 
 def test_gains_come_from_a_file(tmp_path):
@@ -166,7 +169,7 @@ FAULT_TEXT = {
 @pytest.mark.parametrize("fault", BY_DEVICE["analyser"])
 @pytest.mark.parametrize("kind", ["samples", "phasors"])
 def test_each_fault_is_reported(fault, kind):
-    clock, scope, meter = rig()
+    clock, scope, meter = rig(started=False)
     if kind == "phasors":
         scope = meter = PhasorMeter(Capacitor(), clock)
     if fault in ("wrong device", "in use"):
@@ -192,7 +195,6 @@ def test_each_fault_is_reported(fault, kind):
 def test_a_device_that_is_gone_may_only_say_so(monkeypatch):
     """The library sets a flag, and calls fail; either is enough."""
     clock, scope, meter = rig()
-    meter.start(TONES, 1.0)
     monkeypatch.setattr(type(scope.oscilloscope), "_present", lambda part: None)
     scope.fault = "unplugged"
     with pytest.raises(DeviceFault, match="was unplugged"):
@@ -200,9 +202,7 @@ def test_a_device_that_is_gone_may_only_say_so(monkeypatch):
 
 
 def test_phasors_lose_windows_too():
-    clock = SimulatedClock()
-    meter = PhasorMeter(Capacitor(), clock)
-    meter.start(TONES, 1.0)
+    clock, meter = phasors()
     before = follow(clock, meter, 1)[0]
     meter.fault = "data loss"
     clock.wait_until(clock.now() + 0.5)
@@ -213,7 +213,6 @@ def test_phasors_lose_windows_too():
 
 def test_lost_samples_are_counted_and_time_goes_on():
     clock, scope, meter = rig()
-    meter.start(TONES, 1.0)
     before = follow(clock, meter, 1)[0]
     scope.fault = "data loss"
     clock.wait_until(clock.now() + 0.5)
@@ -228,7 +227,6 @@ def test_lost_samples_are_counted_and_time_goes_on():
 
 def test_a_reader_that_was_away_for_long_is_told_what_is_missing():
     clock, _, meter = rig()
-    meter.start(TONES, 1.0)
     follow(clock, meter, 0.5)
     clock.wait_until(clock.now() + 0.8)  # all of it waits in the device
     times, *_, lost = follow(clock, meter, 0.01)
@@ -239,7 +237,6 @@ def test_a_reader_that_was_away_for_long_is_told_what_is_missing():
 
 def test_a_loss_that_is_not_reported_is_found_by_the_clock():
     clock, scope, meter = rig()
-    meter.start(TONES, 1.0)
     follow(clock, meter, 1)
     total = 0
     for _ in range(20):
@@ -255,7 +252,6 @@ def test_a_loss_that_is_not_reported_is_found_by_the_clock():
 def test_a_call_that_is_late_itself_loses_nothing(monkeypatch):
     """The process is held up between the last block and the look at the clock."""
     clock, _, meter = rig()
-    meter.start(TONES, 1.0)
     follow(clock, meter, 1)
     count = meter._missing
     for _ in range(20):
@@ -267,13 +263,12 @@ def test_a_call_that_is_late_itself_loses_nothing(monkeypatch):
 
 def test_a_poll_does_not_wait():
     clock, _, meter = rig()
-    meter.start(TONES, 1.0)
     assert len(meter.read().time_s) == 0
     assert clock.now() == 0
 
 
 def test_wrong_input_is_refused():
-    clock, scope, meter = rig()
+    clock, scope, meter = rig(started=False)
     for address in ("", "COM3", "-1", "../x"):
         with pytest.raises(BadInput, match="serial number"):
             Handyscope(address, clock)
@@ -292,7 +287,6 @@ def test_wrong_input_is_refused():
 def test_after_the_end_the_output_is_off():
     for end in ("stop", "close"):
         _, scope, meter = rig()
-        meter.start(TONES, 1.0)
         assert scope.generator.is_running
         assert scope.generator.output_enable
         getattr(meter, end)()

@@ -11,9 +11,7 @@ import pytest
 
 from sensorgen.measure.log import Log
 
-pytestmark = [
-    pytest.mark.skipif(sys.platform != "linux", reason="pseudo-terminals and /proc of Linux"),
-]
+pytestmark = [pytest.mark.skipif(sys.platform != "linux", reason="pseudo-terminals and /proc of Linux")]
 
 
 @pytest.fixture(scope="module")

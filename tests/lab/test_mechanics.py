@@ -6,15 +6,7 @@ import pytest
 from sensorgen.core.errors import BadInput
 from sensorgen.core.records import checked
 from sensorgen.design.design import make
-from sensorgen.measure.virtual.mechanics import (
-    BY_DEVICE,
-    FAULTS,
-    OPEN_OHM,
-    Mechanics,
-    VirtualRig,
-    VirtualSpecimen,
-    rig_of,
-)
+from sensorgen.measure.virtual.mechanics import OPEN_OHM, Mechanics, VirtualRig, VirtualSpecimen, rig_of
 from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, drawn
 
 DESIGN = make({"shape": "reference"})
@@ -24,38 +16,40 @@ TONES_HZ = np.array([1.1e3, 99.7e3])
 def rig(truth=None, **mechanics):
     """Above the middle of a specimen, at working height, motor on, limit 8 N."""
     found = VirtualRig(PressedSpecimen(DESIGN, truth or Truth()), Mechanics(**mechanics))
-    found.switch(on=True)
-    found.limit(8.0)
-    found.seek(0.0, 50.0, 1.0)
+    lowered(found).seek(0.0, 50.0, 1.0)
     found.travel("x", 50.0, 100.0)
-    found.travel("z", 0.0, 100.0)
-    found.advance(2.0)
+    return after(found, 2.0)
+
+
+def after(found, seconds, motor_n=None):
+    """The rig some time later, with another force of the motor from now on."""
+    if motor_n is not None:
+        found.drive(motor_n)
+    found.advance(found.time_s + seconds)
     return found
 
 
-def after(found, seconds):
-    """The rig some time later."""
-    found.advance(found.time_s + seconds)
+def lowered(found):
+    """The rig with its motor on, limit 8 N, on its way to working height."""
+    found.switch(on=True)
+    found.limit(8.0)
+    found.travel("z", 0.0, 100.0)
     return found
 
 
 def test_without_friction_the_force_is_that_of_the_motor_and_the_weight():
     found = rig(friction_n=0.0)
     for motor in (2.0, 5.0, 1.0):
-        found.drive(motor)
-        assert after(found, 1.0).force_n == pytest.approx(motor + 0.9, abs=1e-6)
+        assert after(found, 1.0, motor).force_n == pytest.approx(motor + 0.9, abs=1e-6)
         assert found.motor_n == pytest.approx(motor)
         assert -found.tip_mm == pytest.approx(found.force_n / 40.0)
 
 
 def test_friction_is_less_force_going_down_and_more_going_up():
     found = rig(friction_n=0.5)
-    found.drive(3.0)
-    down = after(found, 1.0).force_n
-    found.drive(7.0)
-    after(found, 1.0)
-    found.drive(3.0)
-    up = after(found, 1.0).force_n
+    down = after(found, 1.0, 3.0).force_n
+    after(found, 1.0, 7.0)
+    up = after(found, 1.0, 3.0).force_n
     assert (down, up) == pytest.approx((3.4, 4.4), abs=0.05)
 
 
@@ -90,23 +84,19 @@ def test_a_soft_landing_never_presses_harder_than_its_force():
 def test_the_limit_bounds_the_motor():
     found = rig(friction_n=0.0)
     found.limit(3.0)
-    found.drive(7.0)
-    assert after(found, 1.0).force_n == pytest.approx(3.9)
+    assert after(found, 1.0, 7.0).force_n == pytest.approx(3.9)
 
 
 def test_the_motor_lags_and_a_soft_tip_gives_way():
     found = rig(friction_n=0.0, lag_s=0.1, stiffness_n_mm=3.0)
-    found.drive(0.0)
-    after(found, 2.0)
-    found.drive(4.0)
-    assert after(found, 0.1).motor_n == pytest.approx(4.0 * (1 - np.exp(-1)), rel=1e-3)
+    after(found, 2.0, 0.0)
+    assert after(found, 0.1, 4.0).motor_n == pytest.approx(4.0 * (1 - np.exp(-1)), rel=1e-3)
     assert -after(found, 2.0).tip_mm == pytest.approx(4.9 / 3.0, rel=1e-3)
 
 
 def test_raising_the_stage_lifts_the_tip():
     found = rig()
-    found.drive(3.0)
-    assert after(found, 1.0).force_n > 3.0
+    assert after(found, 1.0, 3.0).force_n > 3.0
     found.travel("z", 25.0, 50.0)
     assert after(found, 1.0).force_n == 0.0
     assert found.axis("z") == (25.0, False)
@@ -116,11 +106,9 @@ def test_moves_with_the_tip_down_and_too_high_forces_are_noted():
     found = rig(friction_n=0.0)
     found.travel("x", 20.0, 30.0)
     assert not after(found, 2.0).violations
-    found.drive(3.0)
-    after(found, 1.0)
+    after(found, 1.0, 3.0)
     found.travel("x", 25.0, 10.0)
-    found.drive(7.6)
-    after(found, 2.0)
+    after(found, 2.0, 7.6)
     seen = {one.what: one for one in found.violations}
     assert set(seen) == {"sideways", "force"}
     assert seen["sideways"].duration_s == pytest.approx(0.5, abs=0.01)
@@ -132,8 +120,7 @@ def test_the_reading_is_that_of_the_specimen():
     specimen = found.specimen
     line = specimen.line(TONES_HZ)
     assert found.impedance(TONES_HZ) == pytest.approx(line.impedance(0.0, (0.0, 0.0)), rel=1e-9)
-    found.drive(2.1)
-    after(found, 2.0)
+    after(found, 2.0, 2.1)
     lift = specimen.rise(3.0, 5e-3)
     assert found.impedance(TONES_HZ) == pytest.approx(line.impedance(lift, specimen.patch(0.05)), rel=1e-6)
 
@@ -158,16 +145,13 @@ def test_creep_goes_with_the_logarithm_of_time_and_hysteresis_with_the_peak(cree
 
     found.seek(30.0, 50.0, -0.9)
     after(found, 5.0)
-    found.drive(3.1)
-    after(found, 1.0)
+    after(found, 1.0, 3.1)
     first = share()
     after(found, 9.0)
     later = share()
     assert later / first == pytest.approx(1 + creep, abs=4e-3)
-    found.drive(5.1)
-    after(found, 1.0)
-    found.drive(3.1)
-    after(found, 10.0)
+    after(found, 1.0, 5.1)
+    after(found, 10.0, 3.1)
     assert share() / later == pytest.approx(1 + hysteresis * (1 - 4.0 / 6.0), abs=creep / 2 + 1e-3)
 
 
@@ -227,9 +211,7 @@ def test_a_fault_waits_for_its_force_and_strikes_the_simulator_that_is_attached(
 
     found, controller = planted({"what": "actuator runaway", "at_force_n": 2.0}), Simulator()
     found.planted.attach("actuator", controller)
-    found.switch(on=True)
-    found.limit(8.0)
-    found.travel("z", 0.0, 100.0)
+    lowered(found)
     found.drive(0.5)
     found.advance(3.0)
     assert 1.0 < found.force_n < 2.0
@@ -246,9 +228,7 @@ def test_a_fault_waits_for_its_force_and_strikes_the_simulator_that_is_attached(
 ])  # fmt: skip
 def test_each_fault_of_the_rig_does_what_it_says(fault, seen):
     found = planted({"what": fault, "at_s": 0.5})
-    found.travel("z", 0.0, 100.0)
-    found.switch(on=True)
-    found.limit(8.0)
+    lowered(found)
     found.advance(0.4)
     found.drive(0.0)
     found.advance(6.0)
@@ -257,20 +237,13 @@ def test_each_fault_of_the_rig_does_what_it_says(fault, seen):
 
 def test_a_short_opens_under_load():
     found = planted({"what": "rig short", "at_s": 0.0})
-    found.switch(on=True)
-    found.limit(8.0)
-    found.travel("z", 0.0, 100.0)
+    lowered(found)
     found.seek(0.0, 50.0, 1.0)
     found.advance(1.0)
     assert abs(found.impedance(TONES_HZ)[0]) < 1e3
     found.drive(4.0)
     found.advance(3.0)
     assert abs(found.impedance(TONES_HZ)[0]) > 1e5
-
-
-def test_every_fault_has_a_simulator_and_a_line():
-    assert all(words and "\n" not in words for of in BY_DEVICE.values() for words in of.values())
-    assert all(name.startswith(fault.strikes) for name, fault in FAULTS.items())
 
 
 def test_overrides_are_taken_and_the_rest_is_drawn():

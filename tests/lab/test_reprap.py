@@ -282,22 +282,23 @@ def test_the_simulator_answers_as_the_firmware_does():
     assert firmware.exchange(b"M112\nM999\nG1 X5\n", clock.now() + 2).endswith(b"insufficient axes homed\nok\n")
 
 
+def there_and_back(link, clock, plant):
+    """By the real clock: homed, and moved by 2 mm."""
+    stage = reprap.RepRapStage(link, clock, reprap.Settings(clearance_mm=0.5, lift_mm_s=50))
+    stage.start()
+    for go in (lambda: stage.move(2.0, 100.0), stage.close):
+        while stage.read().moving:
+            clock.wait_until(clock.now() + 0.02)
+        go()
+    assert plant.axis("x")[0] == 2
+
+
 def test_the_same_bytes_over_a_pseudo_terminal():
     pytest.importorskip("serial")
     clock, plant = RealClock(), SpringPlant()
     plant.time_s = clock.now()
     with pseudo_terminal(RepRapFirmware(plant), clock) as path:
-        link = reprap.SerialLink(SerialPort(path, reprap.BAUD), clock)
-        settings = reprap.Settings(clearance_mm=0.5, lift_mm_s=50)
-        stage = reprap.RepRapStage(link, clock, settings)
-        stage.start()
-        while stage.read().moving:
-            pass
-        stage.move(2.0, 100.0)
-        while stage.read().moving:
-            pass
-        assert plant.axis("x")[0] == 2
-        stage.close()
+        there_and_back(reprap.SerialLink(SerialPort(path, reprap.BAUD), clock), clock, plant)
 
 
 def test_the_same_requests_over_http():
@@ -305,16 +306,7 @@ def test_the_same_requests_over_http():
     plant.time_s = clock.now()
     firmware = RepRapFirmware(plant)
     with http_server(firmware, clock) as address:
-        settings = reprap.Settings(clearance_mm=0.5, lift_mm_s=50)
-        stage = reprap.RepRapStage(reprap.WebLink(HttpPort(address), clock, "reprap"), clock, settings)
-        stage.start()
-        while stage.read().moving:
-            clock.wait_until(clock.now() + 0.02)
-        stage.move(2.0, 100.0)
-        while stage.read().moving:
-            clock.wait_until(clock.now() + 0.02)
-        assert plant.axis("x")[0] == 2
-        stage.close()
+        there_and_back(reprap.WebLink(HttpPort(address), clock, "reprap"), clock, plant)
     assert firmware.heard[-1] == b"/rr_disconnect"
     with pytest.raises(DeviceFault, match="failed"):
         HttpPort(address).get("/rr_model", 1.0)

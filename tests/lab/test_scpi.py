@@ -28,6 +28,10 @@ class Lab:
         port = SimulatedPort(self.instrument, self.clock)
         self.meter = meters.LcrMeter(port, self.clock, MODELS[model], meters.LcrSettings(aperture=aperture))
 
+    def started(self):
+        self.meter.start(TONES, 1.0)
+        return self
+
     def run(self, seconds):
         """Read at 100 Hz; everything that came."""
         rows = []
@@ -39,8 +43,7 @@ class Lab:
 
 @pytest.mark.parametrize("model", MODELS)
 def test_frequencies_are_measured_one_after_the_other(model):
-    lab = Lab(model)
-    lab.meter.start(TONES, 1.0)
+    lab = Lab(model).started()
     rows = [each for each in lab.run(1.0) if len(each.time_s)]
     assert len(rows) >= 8
     z = np.concatenate([each.impedance_ohm for each in rows])
@@ -61,8 +64,7 @@ def test_the_time_of_the_manual_is_waited_for_before_a_value_is_fetched(aperture
 
 
 def test_messages_are_in_the_order_of_the_manual():
-    lab = Lab()
-    lab.meter.start(TONES, 1.0)
+    lab = Lab().started()
     lab.run(0.1)
     lab.meter.stop()
     assert b"\n".join(lab.instrument.heard).decode().splitlines() == [
@@ -110,8 +112,7 @@ SEEN = {
 
 @pytest.mark.parametrize("fault", SEEN)
 def test_a_planted_fault_is_seen(fault):
-    lab = Lab()
-    lab.meter.start(TONES, 1.0)
+    lab = Lab().started()
     lab.run(0.5)
     lab.instrument.fault = fault
     with pytest.raises(DeviceFault, match=SEEN[fault]):
@@ -119,8 +120,7 @@ def test_a_planted_fault_is_seen(fault):
 
 
 def test_readings_that_a_program_which_has_died_did_not_fetch_are_passed_over():
-    lab = Lab()
-    lab.meter.start(TONES, 1.0)
+    lab = Lab().started()
     lab.clock.wait_until(1.0)
     port = SimulatedPort(lab.instrument, lab.clock)
     for command in (b"FETC?\n", b"FREQ?\n", b"SYST:ERR?\n"):
@@ -141,8 +141,7 @@ def test_an_error_of_the_instrument_is_reported():
 
 def test_an_overload_is_clipped_and_no_number():
     """Status 1: bridge unbalanced, value 9.9E37."""
-    lab = Lab()
-    lab.meter.start(TONES, 1.0)
+    lab = Lab().started()
     lab.instrument.fault = "overload"
     rows = [each for each in lab.run(0.5) if len(each.time_s)]
     assert all(each.clipped.all() for each in rows[1:])

@@ -33,10 +33,15 @@ class Lab:
             reading = self.actuator.read()
         return reading
 
-    def push(self, force_n):
-        """Press for a second; the last reading."""
+    def push(self, force_n, seconds=1.0):
+        """Press for a time; the last reading."""
         self.actuator.push(force_n)
-        return self.run(1.0)
+        return self.run(seconds)
+
+    def unheard(self, seconds):
+        """Let time pass without a word from the computer."""
+        self.clock.wait_until(self.clock.now() + seconds)
+        self.controller.exchange(b"", self.clock.now())
 
     def home(self, limit_n=6.0):
         """At the upper end, with the motor on."""
@@ -126,8 +131,7 @@ def test_before_its_end_is_found_the_piston_counts_as_out():
 
 def test_force_mode_presses_with_the_force_less_the_weight():
     lab = Lab().home()
-    lab.actuator.push(3.0)
-    reading = lab.run(1.0)
+    reading = lab.push(3.0)
     assert lab.plant.force_n == pytest.approx(3.0, abs=0.0167)
     assert reading.force_n == pytest.approx(3.0, abs=0.0167)
     assert reading.position_mm == pytest.approx(21.5, abs=0.02)
@@ -135,12 +139,10 @@ def test_force_mode_presses_with_the_force_less_the_weight():
 
 def test_friction_is_overcome_by_the_current_and_subtracted_from_the_reading():
     lab = Lab(friction_n=0.3).home()
-    lab.actuator.push(3.0)
-    lab.run(1.0)
+    lab.push(3.0)
     assert lab.plant.motor_n == pytest.approx(3.0 - 0.9 + 0.3, abs=0.02)
     assert lab.actuator.read().force_n == pytest.approx(3.0, abs=0.02)
-    lab.actuator.push(2.0)
-    assert lab.run(1.0).force_n == pytest.approx(2.0, abs=0.02)
+    assert lab.push(2.0).force_n == pytest.approx(2.0, abs=0.02)
     assert lab.plant.motor_n == pytest.approx(2.0 - 0.9 - 0.3, abs=0.02)
 
 
@@ -150,8 +152,7 @@ def test_a_soft_landing_ends_at_its_force():
     reading = lab.run(4.0)
     assert lab.plant.force_n == pytest.approx(0.5, abs=0.02)
     assert 20 < reading.position_mm < 21
-    lab.actuator.push(4.0)
-    lab.run(1.0)
+    lab.push(4.0)
     assert lab.plant.force_n == pytest.approx(4.0, abs=0.02)
     lab.actuator.lift()
     assert lab.run(1.0).position_mm == pytest.approx(0, abs=0.01)
@@ -163,8 +164,7 @@ def test_the_controller_itself_keeps_the_limit(limit):
     lab = Lab().home(limit)
     lab.controller.fault = "runaway"
     for _ in range(100):
-        lab.clock.wait_until(lab.clock.now() + 0.01)
-        lab.controller.exchange(b"", lab.clock.now())
+        lab.unheard(0.01)
         assert lab.plant.force_n <= limit
     assert lab.plant.force_n == pytest.approx(limit, abs=0.02)
 
@@ -208,8 +208,7 @@ def test_every_fault_of_the_simulator_is_tried():
 @pytest.mark.parametrize("fault", [name for name, message in SEEN.items() if message])
 def test_a_planted_fault_is_seen(fault):
     lab = Lab().home()
-    lab.actuator.push(3.0)
-    lab.run(0.5)
+    lab.push(3.0, 0.5)
     lab.controller.fault = fault
     with pytest.raises(DeviceFault, match=SEEN[fault]):
         lab.push(1.0)
@@ -236,15 +235,13 @@ def test_a_set_point_that_is_not_taken_is_seen():
 @pytest.mark.parametrize("fault", ["error", "silent", "runaway", ""])
 def test_after_a_fault_the_piston_is_lifted_and_the_motor_switched_off(fault):
     lab = Lab().home()
-    lab.actuator.push(3.0)
-    lab.run(0.5)
+    lab.push(3.0, 0.5)
     lab.controller.fault = fault
     with suppress(DeviceFault):
         lab.run(0.1)
     lab.controller.fault = "" if fault == "runaway" else fault
     lab.actuator.lift()
-    lab.clock.wait_until(lab.clock.now() + 1.5)
-    lab.controller.exchange(b"", lab.clock.now())
+    lab.unheard(1.5)
     assert lab.plant.extension_mm == 0
     lab.actuator.off()
     assert not lab.plant.on
@@ -253,8 +250,7 @@ def test_after_a_fault_the_piston_is_lifted_and_the_motor_switched_off(fault):
 def test_a_piston_that_is_being_lifted_is_not_let_fall_by_a_silent_controller():
     """It obeys, but cannot be heard: reading fails, and the motor stays on until it is switched off."""
     lab = Lab().home()
-    lab.actuator.push(3.0)
-    lab.run(0.5)
+    lab.push(3.0, 0.5)
     lab.controller.fault = "silent"
     with pytest.raises(DeviceFault, match="motor off was sent"):
         lab.run(0.1)
@@ -262,8 +258,7 @@ def test_a_piston_that_is_being_lifted_is_not_let_fall_by_a_silent_controller():
     lab.actuator.lift()
     with pytest.raises(DeviceFault, match=r"check cable and power$"):
         lab.run(0.1)
-    lab.clock.wait_until(lab.clock.now() + 1.0)
-    lab.controller.exchange(b"", lab.clock.now())
+    lab.unheard(1.0)
     assert (lab.plant.extension_mm, lab.plant.on) == (0, True)
 
 
@@ -284,8 +279,7 @@ def test_another_process_lifts_from_any_state_on_a_line_opened_anew(state):
         lab.controller.fault = "error"
     other = smac.SmacActuator(SimulatedPort(lab.controller, lab.clock), lab.clock)
     other.lift()
-    lab.clock.wait_until(lab.clock.now() + 1.5)
-    lab.controller.exchange(b"", lab.clock.now())
+    lab.unheard(1.5)
     assert (lab.plant.extension_mm, lab.plant.on) == (0, True)
     other.off()
     assert not lab.plant.on

@@ -1,36 +1,14 @@
 """A log of its own for each test, and the command line on it."""
 
-import sys
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from sensorgen.cli import main
+from in_process import captured
 from sensorgen.measure.log import Log
 
 HERE = Path(__file__).parent
-
-
-@dataclass(frozen=True)
-class Said:
-    """What a command left behind."""
-
-    code: int
-    out: str
-    err: str
-
-    @property
-    def words(self):
-        """The output without its line breaks and columns."""
-        return " ".join(self.out.split())
-
-    @property
-    def line(self):
-        """The one line on stderr; anything else there is a fault."""
-        assert self.err.count("\n") == 1, self.err
-        assert self.err.startswith("sensorgen: "), self.err
-        return self.err.strip()
 
 
 @pytest.fixture
@@ -52,12 +30,4 @@ def run(capfd, monkeypatch, tmp_path, path):
     """Run a command of ``sensorgen log`` in this process, in an empty folder."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
-
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["sensorgen", "log", *map(str, words)])
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as left:
-            main()
-        return Said(left.value.code, *capfd.readouterr())
-
-    return call
+    return partial(captured, capfd, monkeypatch, "log")

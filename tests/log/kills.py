@@ -91,11 +91,8 @@ def main(folder, kills, seed):
     with Log(path) as log:
         faults += list(verify.faults(log))
         rows = log.count(Reading) + log.count(BenchRun)
-    print(
-        json.dumps(
-            {"kills": kills, "promised": len(promised), "rows": rows, "before any promise": idle, "faults": faults}
-        )
-    )
+    counts = {"kills": kills, "promised": len(promised), "rows": rows}
+    print(json.dumps(counts | {"before any promise": idle, "faults": faults}))
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import pytest
 import scipy.io
 
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.measure.log import Log, RawFile, files, verify
+from sensorgen.measure.log import Log, RawFile, bench, files, verify
 from sensorgen.measure.log.bench import log_recording, read_again
 from sensorgen.measure.recording import joined_all
 
@@ -28,9 +28,8 @@ def run_files(tmp_path_factory):
     z[1400:1414] = 0
     content = made.tree([z], [run.time_s], made.stamps(run.time_s))
     scipy.io.savemat(folder / "run.mat", content)
-    return folder / "run.mat", made.write_rig(
-        folder / "rig.csv", made.rig_rows(MADE, OFFSET_S), {3: "stalled", 90: "stalled"}
-    )
+    errors = {3: "stalled", 90: "stalled"}
+    return folder / "run.mat", made.write_rig(folder / "rig.csv", made.rig_rows(MADE, OFFSET_S), errors)
 
 
 def test_files_are_kept_whole_and_what_was_counted_beside_them(log, run_files):
@@ -163,8 +162,6 @@ def test_a_huge_file_is_refused_before_it_is_read(log, tmp_path, run_files, monk
 
 
 def test_a_recording_that_grows_while_it_is_read_is_refused(log, tmp_path, monkeypatch):
-    from sensorgen.measure.log import bench
-
     path = tmp_path / "run.csv"
     rows = "".join(f"{k},-{k},{k}\n" for k in range(1, 99))
     path.write_text(f"re_ohm_1kHz,im_ohm_1kHz,time_s\n{rows}")

@@ -33,13 +33,8 @@ def test_json_for_programs(run):
     (row,) = json.loads(run("multimeter", "23 triX", "--y", "OL", "--z", "1 / OL", "--json").out)
     assert (row["y_ohm"], row["z_ohm"], row["number"], row["baked"]) == (["OL"], [1.0, "OL"], 1, None)
     assert json.loads(run("list", "--json").out)["readings"] == [row]
-    assert json.loads(run("import", "--thesis", "--json").out) == {
-        "rows": 69,
-        "new": 69,
-        "doubtful": 38,
-        "corrections": 0,
-        "left_out": [],
-    }
+    told = json.loads(run("import", "--thesis", "--json").out)
+    assert told == {"rows": 69, "new": 69, "doubtful": 38, "corrections": 0, "left_out": []}
 
 
 WRONG = {
@@ -80,10 +75,8 @@ def test_a_small_m_is_asked_for_on_a_terminal_and_flagged_elsewhere(run, path, m
     monkeypatch.setattr("click.confirm", lambda text, **_: asked.append(text) or len(asked) == 1)
     assert "m read as mega" not in run("multimeter", "23 triX", "--z", "1.1m / 2", "--y", "3m").out
     assert asked == ["3m, 1.1m: is m mega (a million)?"]
-    assert (
-        "'1.1m' is not logged; write M for mega, or 0.0011 for 1.1 milliohm"
-        in run("multimeter", "23 triX", "--z", "1.1m").line
-    )
+    refused = run("multimeter", "23 triX", "--z", "1.1m").line
+    assert "'1.1m' is not logged; write M for mega, or 0.0011 for 1.1 milliohm" in refused
     run("multimeter", "23 triX", "--z", "1.1M")
     assert len(asked) == 2
     with Log(path) as log:
@@ -183,27 +176,14 @@ def test_what_slicers_print_is_kept_beside_what_was_drawn(run, path, tmp_path):
     with Log(path) as log:
         (kept,) = log.predictions()
     assert json.loads(kept.data) == {"capacitance_f": {"lower": 1e-11}, "printed": {"prusa": report}}
-    for slicers, message in (
-        (3, "slicers is 3; expected a mapping"),
-        ({"prusa": []}, "slicers.prusa is []; expected a mapping"),
-        ({"prusa": {"printed": "x"}}, "slicers.prusa.printed is 'x'; expected a mapping"),
-    ):
+    wrong = {" is 3": 3, ".prusa is []": {"prusa": []}, ".prusa.printed is 'x'": {"prusa": {"printed": "x"}}}
+    for message, slicers in wrong.items():
         (tmp_path / "batch.json").write_text(json.dumps(BATCH | {"slicers": slicers}))
-        said = run("import", "batch.json", "--log", "new.db")
-        assert message in said.line
+        assert f"slicers{message}; expected a mapping" in run("import", "batch.json", "--log", "new.db").line
 
 
-BATCH = {
-    "batch": "26",
-    "specimens": {
-        "26 triX .1mm": {"design": "trix-d0.1", "design_id": "a" * 16, "expected": {"capacitance_f": {"lower": 1e-11}}},
-        "26 triX .1mm 2": {
-            "design": "trix-d0.1",
-            "design_id": "a" * 16,
-            "expected": {"capacitance_f": {"lower": 1e-11}},
-        },
-    },
-}
+OF_BATCH = {"design": "trix-d0.1", "design_id": "a" * 16, "expected": {"capacitance_f": {"lower": 1e-11}}}
+BATCH = {"batch": "26", "specimens": {"26 triX .1mm": OF_BATCH, "26 triX .1mm 2": OF_BATCH}}
 
 
 def test_a_print_bed_ties_its_specimens(run, path, tmp_path):
@@ -257,11 +237,8 @@ def test_a_long_list_loads_little(tmp_path):
         values = ", ".join(new.get(name, name) for name in columns)
         log._connection.execute(f"INSERT INTO record {number} SELECT {values} FROM record, n WHERE number = 1")
         assert log.count(Reading) == 100_000
-    done = subprocess.run(
-        [sys.executable, "-X", "importtime", "-m", "sensorgen", "log", "list", "--log", path],
-        capture_output=True,
-        encoding="utf-8",
-    )
+    words = [sys.executable, "-X", "importtime", "-m", "sensorgen", "log", "list", "--log", path]
+    done = subprocess.run(words, capture_output=True, encoding="utf-8")
     assert "100000 readings" in done.stdout
     assert len(done.stdout.splitlines()) == 45
     loaded = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}

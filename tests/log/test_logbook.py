@@ -86,11 +86,8 @@ def test_every_reading_is_tied_to_specimen_iteration_design_and_batch(log):
 def test_nothing_is_changed_or_taken_out(log, path):
     filled(log)
     before = everything(log)
-    for statement in (
-        "DELETE FROM record",
-        "UPDATE record SET content = 'x'",
-        "INSERT OR REPLACE INTO record SELECT * FROM record",
-    ):
+    again = "INSERT OR REPLACE INTO record SELECT * FROM record"
+    for statement in ("DELETE FROM record", "UPDATE record SET content = 'x'", again):
         connection = sqlite3.connect(path)
         connection.execute("PRAGMA recursive_triggers = ON")
         with pytest.raises(sqlite3.IntegrityError, match="nothing in the log is changed or taken out"):
@@ -155,23 +152,6 @@ def test_the_bake_is_what_is_said_or_remarked(remark, said, baked):
 def test_a_remark_that_contradicts_is_doubtful():
     row = reading("23 triX .1mm", "650", remark="not baked", baked=True)
     assert (row.baked, row.doubts) == (True, ("baked, but the remark says that it is not",))
-
-
-HOSTILE = [
-    "'; DROP TABLE reading;--",
-    '"<script>alert(1)</script>',
-    "=cmd|' /C calc'!A0",
-    "\x1b[2J\n\tü ∞ 🙂",
-    "%s {0} \\",
-    "'",
-]
-
-
-@pytest.mark.parametrize("remark", HOSTILE)
-def test_hostile_remarks_stay_text(log, remark):
-    log.add([reading("23 triX", "650", remark=remark)])
-    assert log.readings()[0].remark == remark
-    assert list(log.entries(Reading, source=remark)) == []
 
 
 def test_settings_that_keep_what_is_promised(log):
@@ -334,10 +314,8 @@ def test_a_writer_who_does_not_end_is_told(log, path, monkeypatch):
     monkeypatch.setattr(database, "WAIT_S", 0.05)
     other = sqlite3.connect(path, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
-    with (
-        Log(path) as late,
-        pytest.raises(Unwritable, match=r"another program has locked the log .* nothing was logged"),
-    ):
+    refused = pytest.raises(Unwritable, match=r"another program has locked the log .* nothing was logged")
+    with Log(path) as late, refused:
         late.add([reading("23 triX", "650")])
     assert log.readings() == ()  # readers do not wait
     other.close()

@@ -77,10 +77,8 @@ def test_a_reading_is_logged_with_the_meter_s_words_and_name(run, path):
 
 
 def test_an_overload_is_infinite_and_no_number(run, path):
-    assert (
-        "Z OL, written '+9.90000000E+37'"
-        in run("multimeter", "23 triX", "--visa", "GPIB0::23::INSTR", "--axis", "z").words
-    )
+    said = run("multimeter", "23 triX", "--visa", "GPIB0::23::INSTR", "--axis", "z").words
+    assert "Z OL, written '+9.90000000E+37'" in said
     with Log(path) as log:
         assert log.readings()[0].z_ohm == (float("inf"),)
 

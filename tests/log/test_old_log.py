@@ -4,12 +4,11 @@ import csv
 import json
 import re
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
 
-from sensorgen.cli import main
+from in_process import captured
 from sensorgen.design.design import make
 
 OLD = Path(__file__).parents[1] / "reference" / "0645a80"
@@ -32,12 +31,8 @@ def command(capfd, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
 
     def call(*words, code=0):
-        monkeypatch.setattr(sys, "argv", ["sensorgen", *map(str, words)])
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as left:
-            main()
-        said = capfd.readouterr()
-        assert code in (left.value.code, None), said.err
+        said = captured(capfd, monkeypatch, *words)
+        assert code in (said.code, None), said.err
         return said.out
 
     return call
@@ -86,10 +81,8 @@ def test_every_specimen_is_shown_with_all_its_rows(old, command):
         kinds = [sum(column in row for row in rows) for column in ("y_words", "facts", "data")]
         assert tuple(kinds) == counts, specimen
         for row in (row for row in rows if "y_words" in row):
-            then = readings[row["uid"]]
-            assert [row[k] for k in ("written", "y_words", "z_words", "remark", "design_id", "batch")] == [
-                then[k].removeprefix("'") for k in ("written", "y_words", "z_words", "remark", "design_id", "batch")
-            ]
+            then, same = readings[row["uid"]], ("written", "y_words", "z_words", "remark", "design_id", "batch")
+            assert [row[key] for key in same] == [then[key].removeprefix("'") for key in same]
 
 
 def test_a_correction_stands_for_the_reading_that_it_corrects(old, command):

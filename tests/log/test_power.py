@@ -59,9 +59,3 @@ def test_everything_is_on_the_disk_before_it_is_acknowledged(tmp_path, pending):
         log.add = add
         assert log_recording(log, "26 triX .1mm", tmp_path / "run.mat")
         assert not pending
-
-
-def test_a_commit_waits_for_the_disk(tmp_path):
-    """SQLite syncs its write-ahead log at every commit, and its folder when it makes it."""
-    with Log(tmp_path / "log.db", create=True) as log:
-        assert (log.pragma("journal_mode"), log.pragma("synchronous")) == (("wal",), ("2",))

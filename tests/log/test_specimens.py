@@ -11,6 +11,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.design import load, make
 from sensorgen.measure.log import Batch, Log, Print, RawFile, Reading, exchange, logbook, notes, prints, sync
 from sensorgen.measure.log.entries import DEFECTS
+from sensorgen.measure.log.prints import design_row
 from sensorgen.prediction import bodies
 
 OWN = "shape: tri\nname: mysensor\nparameters: {length_mm: 120, width_mm: 6, dielectric_mm: 0.3}\n"
@@ -140,8 +141,6 @@ def test_two_designs_of_one_name_stay_apart(log, own, tmp_path):
 
 def test_a_name_on_a_bed_is_bound_to_the_place_on_it(log):
     design = make({"shape": "tri", "parameters": {"length_mm": 50.0}, "name": "short"})
-    from sensorgen.measure.log.prints import design_row
-
     log.add([
         RawFile(uid="f" * 64, name="batch.json", size=1), Batch(uid="b", batch="bed 7", file="f" * 64),
         design_row(design.id(), design.name, design.resolved()),
@@ -187,29 +186,21 @@ def test_a_withdrawn_print_binds_no_more(log, own):
         notes.specimen("S1", log)
 
 
-def verdicts(run, tmp_path, path, readings):
-    """Verdict of plates of 0.3 mm electrodes by their length [mm] and reading along one."""
+@pytest.mark.parametrize(
+    ("readings", "intact"),
+    [
+        pytest.param([(100, 2e6)] * 3, 0, id="prints that all broke do not vouch for each other"),
+        pytest.param([(20, 280), (20, 2e6), (20, 3e6)], 1, id="no k was lost beside two broken tracks"),
+        pytest.param([(20, 420), (20, 392), (20, 448), (100, 2100)], 4, id="a long print beside short ones"),
+    ],
+)
+def test_a_print_is_judged_by_others_only_as_far_as_they_are_sound(run, tmp_path, path, shared_cache, readings, intact):
+    """Plates by their length [mm] and reading: 280 ohm and 1.4 kohm by rho l / (w t), of 0.042 ohm m and 0.3 mm."""
     for k, (length, ohm) in enumerate(readings):
         design = tmp_path / f"plate{length}.yaml"
         design.write_text(f"shape: reference\nparameters: {{length_mm: {length}}}\n")
         assert run("add", f"P{k}", "--design", design, "--y", f"{ohm:g}", "--z", "OL").code == 0
     with Log(path) as log:
-        return [
-            row.verdict.word for row in of_iteration(log, None, specimens=[f"P{k}" for k in range(len(readings))]).last
-        ]
-
-
-def test_prints_that_all_broke_do_not_vouch_for_each_other(run, tmp_path, path, shared_cache):
-    """A plate's 1.4 kohm by rho l / (w t), at 0.042 ohm m; no material's range reaches to 2 Mohm."""
-    assert verdicts(run, tmp_path, path, [(100, 2e6), (100, 2e6), (100, 2e6)]) == ["open electrode"] * 3
-
-
-def test_a_sound_print_is_not_judged_by_broken_ones(run, tmp_path, path, shared_cache):
-    """280 ohm by rho l / (w t) beside two broken tracks: no k was lost."""
-    assert verdicts(run, tmp_path, path, [(20, 280), (20, 2e6), (20, 3e6)]) == ["intact", *["open electrode"] * 2]
-
-
-def test_a_long_print_is_not_judged_by_short_ones(run, tmp_path, path, shared_cache):
-    ohm = {length: 0.042 * length * 1e-3 / (10e-3 * 0.3e-3) for length in (20, 100)}
-    readings = [(20, 1.5 * ohm[20]), (20, 1.4 * ohm[20]), (20, 1.6 * ohm[20]), (100, 1.5 * ohm[100])]
-    assert verdicts(run, tmp_path, path, readings) == ["intact"] * 4
+        found = of_iteration(log, None, specimens=[f"P{k}" for k in range(len(readings))])
+    words = ["intact"] * intact + ["open electrode"] * (len(readings) - intact)
+    assert [row.verdict.word for row in found.last] == words

@@ -6,9 +6,7 @@ import zipfile
 import pytest
 
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.design import specimen_name
-from sensorgen.design.design import Design
-from sensorgen.measure.log import Log, exchange, notes
+from sensorgen.measure.log import Log, exchange
 from sensorgen.measure.log.logbook import withdraw
 
 HEAD = "specimen,y,z,remark\n"
@@ -88,16 +86,10 @@ WRONG = {
     "pickle": (pickle.dumps({"specimen": 1}), "is a Python pickle"),
     "gzip": (b"\x1f\x8b\x08\0", "is packed with gzip"),
     "utf-16": (HEAD.encode("utf-16"), "is UTF-16"),
-    "latin-1": (
-        HEAD.encode() + "23 triX,1,2,gr\xf6\xdfe\n".encode("latin-1"),
-        "row 2, character 15: byte 0xf6 is not UTF-8",
-    ),
+    "latin-1": (f"{HEAD}23 triX,1,2,gr\xf6\xdfe\n".encode("latin-1"), "row 2, character 15: byte 0xf6 is not UTF-8"),
     "zero byte": (HEAD + "23 triX,1,2,\0\n", "row 2: a zero byte"),
     "zero byte elsewhere": ("specimen,y,who\n23 triX,1,\0\n", "row 2: a zero byte"),
-    "huge cell": (
-        HEAD + "23 triX,1,2," + "x" * 200_000 + "\n",
-        "row 2: this is no row of a CSV file (field larger than field limit",
-    ),
+    "huge cell": (HEAD + "23 triX,1,2," + "x" * 200_000 + "\n", "row 2: this is no row of a CSV file (field larger"),
     "long remark": (HEAD + "23 triX,1,2," + "x" * 20_000 + "\n", "row 2: a remark of 20000 characters"),
     "long name": (HEAD + "23 triX" + "x" * 9_000 + ",1,2,\n", "row 2:"),
 }
@@ -200,23 +192,6 @@ def test_another_table_of_the_same_name_is_refused_with_the_way_out(take, log):
     withdraw(log, "reading", 1, "corrected")
     assert take(HEAD + "23 triX,710,40,\n").new == 1
     assert [r.y_ohm[0] for r in log.readings()] == [700.0, 700.0, 710.0]
-
-
-def test_a_design_is_identified_once_however_many_rows_it_has(tmp_path, monkeypatch):
-    """Rows of two designs in many copies; identifying one takes longer than logging ten rows."""
-    identified, real = [], Design.id
-    monkeypatch.setattr(Design, "id", lambda design: identified.append(design.name) or real(design))
-    notes._design.cache_clear()
-    notes._by_name.cache_clear()
-    rows = [f"31 tri{'XY'[k % 2]} .1mm {2 + k // 2},0.{k + 10}k,40" for k in range(80)]
-    path = tmp_path / "many.csv"
-    path.write_text("\n".join(["specimen,y,z", *rows]) + "\n")
-    with Log(tmp_path / "log.db", create=True) as log:
-        assert exchange.import_file(log, path, {}).new == 80
-        found = log.readings()
-    assert sorted(identified) == ["trix-d0.1", "triy-d0.1"]
-    expected = {x: specimen_name.design_of(specimen_name.parse(f"tri{x} .1mm")) for x in "XY"}
-    assert all((r.design, r.design_id) == (expected[r.axes].name, real(expected[r.axes])) for r in found)
 
 
 def test_a_fault_in_the_last_row_logs_none_of_those_before(tmp_path):

@@ -1,8 +1,11 @@
 """Scenes of cells that several tests speak of."""
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
+import pytest
 
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import rect, tri
@@ -12,6 +15,12 @@ from sensorgen.solvers.electrostatics.mesh import Cones
 
 EPS = {"x60": 4.68, "air": 1.00059}
 MM = 1e-3
+CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
+
+
+def close(expected, rel: float):
+    """Relative only: pytest's absolute tolerance of 1e-12 is more than many a capacitance."""
+    return pytest.approx(expected, rel=rel, abs=0)
 
 
 def tri_cell(film_mm: float, **options) -> Scene:

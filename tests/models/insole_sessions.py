@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-BAR_KPA = 100.0
-
 
 @dataclass(frozen=True)
 class Insole:

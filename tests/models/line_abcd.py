@@ -13,8 +13,6 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.solvers.line.inputs import Inputs, PressedLine, read
 
 SOURCE = "Thesis Eqs. B.43, B.51 and B.52, for unequal tracks; D. M. Pozar, Microwave Engineering, 4.4"
-COST = 0
-
 Matrix = tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]
 
 

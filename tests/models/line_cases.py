@@ -9,20 +9,10 @@ import mpmath
 FILE = json.loads((Path(__file__).parents[1] / "reference" / "line_all.json").read_text("utf-8"))
 TONES = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)
 PLATE = {
-    "length_m": 0.1,
-    "width_m": 0.01,
-    "top_thickness_m": 3e-4,
-    "bottom_thickness_m": 3e-4,
-    "top_resistivity_ohm_m": 0.07,
-    "bottom_resistivity_ohm_m": 0.2,
-    "film_m": 6e-4,
-    "eps_r": 4.68,
-    "modulus_pa": 6e6,
-    "tip_m": 0.01,
-    "force_n": 3.0,
-    "left_m": 0.045,
-    "frequency_hz": 99.7e3,
-}
+    "length_m": 0.1, "width_m": 0.01, "top_thickness_m": 3e-4, "bottom_thickness_m": 3e-4,
+    "top_resistivity_ohm_m": 0.07, "bottom_resistivity_ohm_m": 0.2, "film_m": 6e-4, "eps_r": 4.68, "modulus_pa": 6e6,
+    "tip_m": 0.01, "force_n": 3.0, "left_m": 0.045, "frequency_hz": 99.7e3,
+}  # fmt: skip
 
 
 def cases() -> list[tuple[dict[str, Any], tuple[str, str]]]:
@@ -40,18 +30,26 @@ def exact(digits: int = 60, **inputs: Any) -> Any:
         return +_exact(inputs)
 
 
+def slope(name: str, digits: int, step: int, **inputs: Any) -> Any:
+    """Derivative of the exact line by an input: central differences of 10^-step."""
+    with mpmath.workdps(digits):
+        h = mpmath.mpf(10) ** -step
+        low, high = (exact(digits, **(inputs | {name: mpmath.mpf(inputs[name]) + s * h})) for s in (-1, 1))
+        return (high - low) / (2 * h)
+
+
+def product(parts: Any) -> Any:
+    """ABCD matrix of sections (ohm/m, S/m, m), with the digits of the moment."""
+    whole = mpmath.eye(2)
+    for part in parts:
+        whole *= matrix(*(mpmath.mpmathify(v) for v in part))
+    return whole
+
+
 def _exact(given: dict[str, Any]) -> Any:
-    defaults = {
-        "tan_delta": 0,
-        "leak_s_per_m": 0,
-        "force_n": 0,
-        "left_m": 0,
-        "tip_m": 0,
-        "modulus_pa": 1,
-        "top_piezoresistance_per_n": 0,
-        "bottom_piezoresistance_per_n": 0,
-        "eps0_f_per_m": 8.8541878128e-12,
-    }
+    zero = ("tan_delta", "leak_s_per_m", "force_n", "left_m", "tip_m")
+    zero += ("top_piezoresistance_per_n", "bottom_piezoresistance_per_n")
+    defaults = dict.fromkeys(zero, 0) | {"modulus_pa": 1, "eps0_f_per_m": 8.8541878128e-12}
     far_end = given.get("far_end", "open")
     p = {k: mpmath.mpmathify(v) for k, v in (defaults | given).items() if k != "far_end"}
     strain = p["force_n"] / (p["width_m"] * p["tip_m"] * p["modulus_pa"]) if p["force_n"] else mpmath.mpf(0)

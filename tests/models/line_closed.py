@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex
-from sensorgen.core.errors import OutOfRange, UnknownName
+from sensorgen.core.errors import OutOfRange
 from sensorgen.solvers.line.inputs import Inputs, PressedLine, read
 
 SOURCE = "Thesis appendix B, Eqs. B.39, B.42, B.48, B.51, B.53, and Eqs. 2.24 and B.54"
-COST = 0
-
 PRINTED = ("B.39", "B.42", "B.48")
 
 Array = NDArray[Any]
@@ -44,8 +42,6 @@ def impedance(line: PressedLine, as_printed: str = "") -> Complex:
 
     Raises
     ------
-    UnknownName
-        ``as_printed`` names no misprint.
     OutOfRange
         A far end that is not open; or where the exponentials have no number: they overflow, or r or y is 0.
 
@@ -61,9 +57,17 @@ def impedance(line: PressedLine, as_printed: str = "") -> Complex:
     >>> [round(float(impedance(plate, printed).real), 1) for printed in ("", "B.48", "B.39")]
     [2997.1, 8157.1, -2997.1]
     """
-    if as_printed and as_printed not in PRINTED:
-        raise UnknownName("misprint", as_printed, PRINTED)
-    return _product(as_printed, _open(line))
+    inputs = _open(line)
+    r, y, lengths = inputs.sections()
+    height, width = inputs["top_thickness_m"], inputs["width_m"]
+    with np.errstate(all="ignore"):
+        (a, b, c, d), *others = (
+            _matrix(as_printed, rs * height * width / 2, rs * ys / 2, height, width, length)
+            for rs, ys, length in zip(r, y, lengths, strict=True)
+        )
+        for e, f, g, h in others:
+            a, b, c, d = e * a + f * c, e * b + f * d, g * a + h * c, g * b + h * d
+        return _finite(-d / c)
 
 
 def uniform(line: PressedLine) -> Complex:
@@ -86,7 +90,13 @@ def uniform(line: PressedLine) -> Complex:
     OutOfRange
         As :func:`impedance`.
     """
-    return _uniform(_open(line))
+    inputs = _open(line)
+    r, y, _ = inputs.sections()
+    area = inputs["top_thickness_m"] * inputs["width_m"]
+    with np.errstate(all="ignore"):
+        rho, gamma = r[0] * area / 2, r[0] * y[0] / 2
+        e = np.exp(2 * np.sqrt(2 * gamma) * inputs["length_m"])
+        return _finite(np.sqrt(2.0) * rho * (1 + e) / (area * np.sqrt(gamma) * (-1 + e)))
 
 
 def series(line: PressedLine) -> Complex:
@@ -107,7 +117,10 @@ def series(line: PressedLine) -> Complex:
     OutOfRange
         A far end that is not open; no current at all.
     """
-    return _series(_open(line))
+    inputs = _open(line)
+    r, y, _ = inputs.sections()
+    with np.errstate(all="ignore"):
+        return _finite(r[0] * inputs["length_m"] + 1 / (y[0] * inputs["length_m"]))
 
 
 def _open(line: PressedLine) -> Inputs:
@@ -115,20 +128,6 @@ def _open(line: PressedLine) -> Inputs:
     if found.load_ohm is not None:
         raise OutOfRange("the thesis solves the open end only (B.3); for others take model 'line'")
     return found
-
-
-def _product(printed: str, inputs: Inputs) -> Complex:
-    r, y, lengths = inputs.sections()
-    height, width = inputs["top_thickness_m"], inputs["width_m"]
-    with np.errstate(all="ignore"):
-        parts = [
-            _matrix(printed, rs * height * width / 2, rs * ys / 2, height, width, length)
-            for rs, ys, length in zip(r, y, lengths, strict=True)
-        ]
-        (a, b, c, d), second, third = parts
-        for e, f, g, h in (second, third):
-            a, b, c, d = e * a + f * c, e * b + f * d, g * a + h * c, g * b + h * d
-        return _finite(-d / c)
 
 
 def _matrix(printed: str, rho: Array, gamma: Array, height: Array, width: Array, length: Array) -> Matrix:
@@ -139,21 +138,6 @@ def _matrix(printed: str, rho: Array, gamma: Array, height: Array, width: Array,
     a12 = -np.sqrt(2.0) * other * rho / ((gamma if printed == "B.42" else root) * area)
     a21 = -other * root * area / (np.sqrt(2 * rho) if printed == "B.48" else np.sqrt(2.0) * rho)
     return same, a12, -a21 if printed == "B.39" else a21, same
-
-
-def _uniform(inputs: Inputs) -> Complex:
-    r, y, _ = inputs.sections()
-    area = inputs["top_thickness_m"] * inputs["width_m"]
-    with np.errstate(all="ignore"):
-        rho, gamma = r[0] * area / 2, r[0] * y[0] / 2
-        e = np.exp(2 * np.sqrt(2 * gamma) * inputs["length_m"])
-        return _finite(np.sqrt(2.0) * rho * (1 + e) / (area * np.sqrt(gamma) * (-1 + e)))
-
-
-def _series(inputs: Inputs) -> Complex:
-    r, y, _ = inputs.sections()
-    with np.errstate(all="ignore"):
-        return _finite(r[0] * inputs["length_m"] + 1 / (y[0] * inputs["length_m"]))
 
 
 def _finite(z: Array) -> Complex:

@@ -12,12 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Real
-from sensorgen.core.errors import OutOfRange, UnknownName
+from sensorgen.core.errors import OutOfRange
 
 SOURCE = "Thesis appendix C.1, Eqs. C.1 to C.5, as printed and corrected"
-COST = 0
-
-FORMS = ("corrected", "printed")
 
 
 @dataclass(frozen=True)
@@ -86,15 +83,7 @@ class LineFit:
         return Roots(force, _roots(square, linear, rest - np.asarray(resistance_ohm, float)))
 
     def printed_position_m(self, capacitance_f: ArrayLike) -> Real:
-        """Position by C.5 exactly as printed [m]: -(D + EF)^2 under the root, no measured R; nan where it is negative.
-
-        Raises
-        ------
-        OutOfRange
-            A corrected fit: its coefficients are not those of C.2.
-        """
-        if self.form != "printed":
-            raise OutOfRange("C.5 as printed takes the coefficients of C.2: fit with form='printed'")
+        """Position by C.5 of a fit, both as printed [m]: -(D + EF)^2 under the root, no R; nan where it is negative."""
         square, linear, rest = self._in_position(self.force_n(capacitance_f))
         under = -(linear**2) - 4 * square * rest
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -122,12 +111,12 @@ def fit(
     capacitance_f, resistance_ohm : (n,) array
         Readings there at one frequency, see :func:`series` [F], [ohm].
     form : str
-        One of ``FORMS``.
+        "corrected" or "printed".
 
     Raises
     ------
-    UnknownName, OutOfRange
-        No such form; presses that do not determine the coefficients, as with one force only.
+    OutOfRange
+        Presses that do not determine the coefficients, as with one force only.
 
     Examples
     --------
@@ -136,8 +125,6 @@ def fit(
     >>> found.presses([72e-12], [100 + 2 * (1 + 20 * 0.08 - 90 * 0.08**2)]).position_m.round(6).tolist()
     [[0.08, 0.142222]]
     """
-    if form not in FORMS:
-        raise UnknownName("form of the fit", form, FORMS)
     force, x, c, r = (np.asarray(a, float) for a in (force_n, position_m, capacitance_f, resistance_ohm))
     one = np.ones_like(force)
     columns = (one, force, force * x, force * x * x) if form == "corrected" else (one, force, x * x, x, force * x)

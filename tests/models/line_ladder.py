@@ -9,10 +9,9 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import OutOfRange
-from sensorgen.solvers.line.inputs import Inputs, PressedLine, read
+from sensorgen.solvers.line.inputs import PressedLine, read
 
 SOURCE = "Thesis Figs. 2.3, 2.4 and B.4: cells of finite length"
-COST = 1
 
 
 def impedance(line: PressedLine, cells: int = 100, *, one_sided: bool = False) -> Complex:
@@ -38,7 +37,7 @@ def impedance(line: PressedLine, cells: int = 100, *, one_sided: bool = False) -
     Raises
     ------
     OutOfRange
-        No cells; a far end that is not open; no current at all (f = 0 without leak).
+        A far end that is not open; no current at all (f = 0 without leak).
 
     Notes
     -----
@@ -52,19 +51,13 @@ def impedance(line: PressedLine, cells: int = 100, *, one_sided: bool = False) -
     >>> [round(float(impedance(plate, n).real), 2) for n in (1, 10, 100)]
     [2228.88, 2989.54, 2997.04]
     """
-    if cells < 1:
-        raise OutOfRange(f"a ladder needs one cell or more in each section, not {cells}")
     found = read(line)
     if found.load_ohm is not None:
         raise OutOfRange("the ladder's far end is open; for others take model 'line'")
-    return _block(cells, one_sided, found)
-
-
-def _block(cells: int, one_sided: bool, inputs: Inputs) -> Complex:
     behind, before = (1.0, 0.0) if one_sided else (0.5, 0.5)
     admittance: Any = np.asarray(0j)
     with np.errstate(all="ignore"):
-        for r, y, length in zip(*(reversed(part) for part in inputs.sections()), strict=True):
+        for r, y, length in zip(*(reversed(part) for part in found.sections()), strict=True):
             step = length / cells
             for _ in range(cells):
                 admittance = admittance + behind * y * step

@@ -1,30 +1,16 @@
-"""Boxes between two bounds: references, the cross-section's elements, limits, symmetries, the solver by itself."""
-
-import json
-import subprocess
-import sys
-from dataclasses import replace
-from pathlib import Path
+"""Boxes between two bounds: references, the cross-section's elements, voxels, ends amid a cell, bad input."""
 
 import numpy as np
 import pytest
-from cell_scenes import EPS, MM, cut_slabs, plates, rect_cell, stairs, tri_cell
+from cell_scenes import CELLS, EPS, MM, close, cut_slabs, plates, rect_cell, stairs, tri_cell
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
-from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import rect
 from sensorgen.models import columns, fem3d
 from sensorgen.scene.scene import Body, Fill, Scene, box
 from sensorgen.solvers.electrostatics.bounds import FieldStep
-from sensorgen.solvers.electrostatics.boxes import Pair, boxes_of, flux, grid, layered, potential, whole
-from sensorgen.solvers.electrostatics.elimination import HELD
-
-CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
-
-
-def close(expected: float, rel: float):
-    return pytest.approx(expected, rel=rel, abs=0)
+from sensorgen.solvers.electrostatics.boxes import grid, whole
 
 
 @pytest.fixture(scope="module")
@@ -48,45 +34,12 @@ def test_rungs_lie_within_each_other(rungs):
         assert [u for _, u in bounds] == sorted((u for _, u in bounds), reverse=True)
 
 
-def test_columns_lie_outside(rungs):
-    found, best = columns.capacitance(rect_cell(0.1), EPS), rungs[0.1][-1].interval
-    assert found.lower < best.lower < best.upper < found.upper
-
-
-def test_layers_of_plates_are_exact():
-    scene = plates(Body("a", "a", (box(0, 2, 0, 1, 0.2, 0.6),)), Body("b", "b", (box(0, 2, 0, 1, 0.6, 1.2),)))
-    found = fem3d.capacitance(scene, {"a": 3.0, "b": 7.0, "air": 1.0}, 1e-8)
-    exact = EPS0_F_PER_M * 2 / (0.4 / 3 + 0.6 / 7) * MM
-    assert (found.lower, found.upper) == close((exact, exact), 2e-9)
-
-
 def test_stairs_as_the_cross_section_has_them():
     """An independent program (triangles, any order) on the same scene, extruded."""
     from sensorgen.models import fem2d
 
     flat, deep = fem2d.capacitance(stairs(2), EPS, 1e-6), fem3d.capacitance(stairs(2), EPS, 2e-2)
     assert deep.lower < flat.lower < flat.upper < deep.upper
-
-
-def test_turned_swapped_and_scaled(rungs):
-    one = rungs[0.2][0].interval
-    turned = next(fem3d.steps(rect_cell(0.2, along="yx"), EPS)).interval
-    over = Scene(
-        tuple(
-            replace(b, terminal={"top": "bottom", "bottom": "top"}.get(b.terminal, ""))
-            for b in rect_cell(0.2).turned_over().bodies
-        ),
-        rect_cell(0.2).size_mm,
-    )
-    swapped = next(fem3d.steps(over, EPS)).interval
-    many = next(fem3d.steps(rect.scene(rect.Params(length_mm=12.0, width_mm=4.0), Fill()), EPS)).interval
-    for other, factor in ((turned, 1), (swapped, 1), (many, 12)):
-        assert (other.lower, other.upper) == close((one.lower * factor, one.upper * factor), 1e-9)
-
-
-def test_doubled_permittivities_double_it():
-    one, two = (next(fem3d.steps(rect_cell(0.2), {m: f * e for m, e in EPS.items()})).interval for f in (1, 2))
-    assert (two.lower, two.upper) == close((2 * one.lower, 2 * one.upper), 1e-9)
 
 
 def test_an_isolation_above_the_electrode_changes_nothing():
@@ -98,18 +51,6 @@ def test_slabs_that_the_sensors_end_cuts():
     scene, exact = cut_slabs()
     found = fem3d.capacitance(scene, EPS)
     assert (found.lower, found.upper) == close((exact, exact), 1e-6)  # the root of what doubles lose
-
-
-def test_layers_stand_where_dielectrics_meet_at_a_corner():
-    """A box of another permittivity between plates, touching neither; none where all is of one kind."""
-    post = plates(Body("post", "x60", (box(0.5, 1.5, 0, 1, 0.5, 0.9),)))
-    coarse = grid(post)
-    same, other = (layered(coarse, [0, 0, *eps], 2) for eps in ([4.0, 4.0], [1.0, 4.68]))
-    planes = [[len(p) for p in found.planes_mm] for found in (coarse, same, other)]
-    assert planes[1] == planes[0]
-    assert planes[2][0] > planes[0][0]
-    assert planes[2][1] == planes[0][1]  # along the edges the field is smooth
-    assert planes[2][2] > planes[0][2]
 
 
 def feet(x: tuple[float, float], y: tuple[float, float] | None = None) -> Scene:
@@ -224,18 +165,6 @@ def test_a_sensor_that_the_end_cuts_in_both_directions_as_voxels_have_it():
     assert all_of_it / one * 4 != close(1000 / 1.1**2, 3e-3)  # by area alone it would not be caught
 
 
-def test_meshes_grow_by_steps():
-    """No mesh couples more than three times the unknowns of the one before."""
-    coarse, values = grid(rect_cell(0.1)), [0, 0, 1.00059, 4.68]
-    unknowns = [
-        Pair.of(layered(coarse, values, m.layers), values, m.order, m.flux_order).unknowns() for m in fem3d.MESHES
-    ]
-    ratios = np.divide(unknowns[1:], unknowns[:-1])
-    assert (ratios > 1).all()
-    assert (ratios < 3).all()
-    assert [m.width for m in fem3d.MESHES] == sorted((m.width for m in fem3d.MESHES), reverse=True)
-
-
 @pytest.mark.parametrize(
     ("first", "width", "meshes"),
     [(1.0, 1.4e-3, [0, 1, 2]), (2.0, 1e-3, [0, 3, 4]), (2.0, 1e-9, [0, 8]), (0.1, 1e-3, [0])],
@@ -276,115 +205,6 @@ def test_a_part_lies_where_any_flux_so_near_has_it(least):
             assert bounds.lower <= truth <= bounds.upper
             seen.append(max(truth - bounds.lower, bounds.upper - truth) / (bounds.upper - bounds.lower))
         assert max(seen) > 0.8
-
-
-def test_what_both_fields_cannot_make_is_the_difference_of_their_energies():
-    """Prager and Synge: of a potential and a flux that one force drives."""
-    scene = feet((0.0, 4.45))
-    coarse = grid(scene)
-    pair = Pair.of(
-        layered(coarse, [0, 0, *(EPS[n] for n in coarse.names[2:])], 1),
-        [0, 0, *(EPS[n] for n in coarse.names[2:])],
-        3,
-        2,
-    )
-    level = pair.flux.solved()
-    energy, unmet = pair.part(level, pair.flux.eps)
-    load = (pair.flux.shares - pair.flux.shares.min())[:, None] * pair.flux.answers(level)
-    drives = (pair.flux.pushed(load), pair.potential.pushed(load @ pair.seen))
-    dual, primal = (-driven.least().energy for driven in drives)
-    for driven in drives:  # forces are in balance, at 0 V on both electrodes: what leaves a box enters its neighbour
-        found = driven.solved()
-        left = np.bincount(driven.ids.ravel(), (driven.load - driven.answers(found)).ravel())
-        assert np.abs(left[HELD:]).max() < 1e-9 * np.abs(load).max()
-        assert (found[driven.ids < HELD] == 0).all()
-    assert unmet == close(dual - primal, 1e-6)
-    assert 0 < unmet < 0.2 * dual
-    assert energy > 0
-
-
-@pytest.mark.parametrize("order", [1, 2, 4])
-@pytest.mark.parametrize("kind", [potential, flux])
-def test_no_energy_without_a_field(kind, order):
-    """A potential of 1 everywhere has no field; every other one has energy."""
-    element = kind(order)
-    matrix = element.condensed(np.array([0.3, 1.0, 2.5]))
-    assert matrix == pytest.approx(matrix.T, abs=1e-12)
-    assert matrix @ element.one == pytest.approx(np.zeros(len(matrix)), abs=1e-10)
-    assert np.sort(np.linalg.eigvalsh(matrix))[1] > 1e-6
-
-
-@pytest.mark.parametrize("kind", [potential, flux])
-def test_one_box_is_a_plate(kind):
-    """Energy at 1 V over one edge, the other sides free: eps times area over height."""
-    element = kind(3)
-    edges = np.array([2.0, 3.0, 0.5])
-    matrix = element.condensed(edges.prod() / (2 * edges**2))
-    lattice = element.numbers
-    low, high = ((lattice[:, 2] == z) & ((lattice[:, 3] == 2) | (kind is potential)) for z in (0, element.pitch))
-    free = ~(low | high)
-    held = np.where(high, element.one, 0.0)
-    held[free] = np.linalg.solve(matrix[free][:, free], -matrix[free] @ held)
-    assert held @ matrix @ held == pytest.approx(2 * 3 / 0.5, rel=1e-10)
-
-
-def test_elimination_is_the_dense_solution():
-    """All unknowns at once, without dissection."""
-    fine = layered(grid(rect_cell(0.2)), [0, 0, 1.00059, 4.68], 0)
-    kind = potential(2)
-    boxes = np.argwhere(fine.fill > 1)
-    count = np.array(fine.fill.shape)
-    keys = kind.keys(boxes, count)
-    names, at = np.unique(keys, return_inverse=True)
-    at = at.reshape(keys.shape)
-    edges = np.column_stack([np.diff(p)[boxes[:, a]] for a, p in enumerate(fine.planes_mm)])
-    eps = np.array([0, 0, 1.00059, 4.68])[fine.fill[tuple(boxes.T)]]
-    whole = np.zeros((len(names),) * 2)
-    for n, here in enumerate(at):
-        whole[np.ix_(here, here)] += kind.condensed(eps[n] * edges[n].prod() / (2 * edges[n] ** 2))
-    values = np.full(len(names), np.nan)
-    for code in (0, 1):
-        on = np.isin(keys, kind.keys(np.argwhere(fine.fill == code), count))
-        ones = np.broadcast_to(kind.one, keys.shape)
-        values[at[on]] = ones[on] * code
-    free = np.isnan(values)
-    values[free] = np.linalg.solve(whole[free][:, free], -whole[free][:, ~free] @ values[~free])
-    boxes = boxes_of(fine, [0, 0, 1.00059, 4.68], kind)
-    assert boxes.least().energy == close(values @ whole @ values, 1e-10)
-    assert boxes.unknowns() == free.sum()
-
-
-def test_scikit_fem_comes_from_above_and_near(rungs):
-    """Hexahedra of second order on the same boxes, graded by hand: above the lower bound, near the upper one."""
-    skfem = pytest.importorskip("skfem")
-    from skfem.helpers import dot, grad
-
-    fine = layered(grid(rect_cell(0.2)), [0, 0, 1.00059, 4.68], 1)
-    mesh = skfem.MeshHex.init_tensor(*fine.planes_mm)
-    middle = mesh.p[:, mesh.t].mean(1)
-    at = [np.searchsorted(p, m) - 1 for p, m in zip(fine.planes_mm, middle, strict=True)]
-    fill = fine.fill[tuple(at)]
-    basis = skfem.Basis(mesh, skfem.ElementHex2())
-    eps = skfem.Basis(mesh, skfem.ElementHex0(), quadrature=basis.quadrature).interpolate(
-        np.where(fill > 1, np.array([0, 0, 1.00059, 4.68])[fill], 1e-9)
-    )
-    matrix = skfem.BilinearForm(lambda u, v, w: w.eps * dot(grad(u), grad(v))).assemble(basis, eps=eps)
-    x = np.zeros(basis.N)
-    held = [np.unique(basis.element_dofs[:, fill == code]) for code in (0, 1)]
-    x[held[1]] = 1.0
-    x = skfem.solve(*skfem.condense(matrix, x=x, D=np.concatenate(held)))
-    above = float(x @ matrix @ x) * EPS0_F_PER_M * MM * 4
-    best = rungs[0.2][-1].interval
-    assert best.lower < above
-    assert above == close(best.upper, 8e-3)
-
-
-def test_it_needs_neither_ngsolve_nor_the_cad_kernel():
-    program = (
-        "import sys; from sensorgen.models import fem3d, columns\n"
-        "assert not {'ngsolve', 'netgen', 'build123d', 'OCP'} & set(sys.modules), sorted(sys.modules)"
-    )
-    subprocess.run([sys.executable, "-c", program], check=True)
 
 
 def test_what_it_cannot_speak_of():

@@ -1,23 +1,14 @@
 """From a cell's two energies to the sensor's interval: cells that its end cuts, bounds that cross, none at all."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
-from cell_scenes import EPS, MM, cut_slabs, tri_cell
+from cell_scenes import CELLS, EPS, MM, close, cut_slabs, tri_cell
 
 from sensorgen.core.bounds import Interval
 from sensorgen.design.shapes import tri
 from sensorgen.models import fem2d
 from sensorgen.scene.scene import Fill
 from sensorgen.solvers.electrostatics import bounds as _fem_bounds
-
-CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
-
-
-def close(expected: float, rel: float):
-    return pytest.approx(expected, rel=rel, abs=0)
 
 
 def test_a_sensor_that_ends_amid_a_period_has_the_energy_of_its_length():

@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
+from cell_scenes import close
 from scipy.spatial import Delaunay
 
 from sensorgen.solvers.electrostatics.mesh import exponent, exponents
 from sensorgen.solvers.electrostatics.triangles import Triangles, apart, flipped
-
-
-def close(expected: float, rel: float):
-    return pytest.approx(expected, rel=rel, abs=0)
 
 
 def around(*fans: list[tuple[float, float]]) -> tuple[Triangles, dict[str, float]]:

@@ -5,7 +5,7 @@ from functools import cache
 import mpmath as mp
 import numpy as np
 import pytest
-from cell_scenes import EPS, MM, cut_slabs, plates, prism, tri_cell
+from cell_scenes import EPS, MM, cut_slabs, plates, prism
 
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import columns, fem2d
@@ -17,10 +17,6 @@ from sensorgen.solvers.electrostatics.triangles import Triangles
 
 AIR_AT_1E4 = {"x60": 1e4, "air": 1.0}
 FORMS = {"needle": ((0, 0), (1, 0), (0, 1)), "flat": ((0, 0), (1, 0), (0.4, 1)), "wedge": ((0, 0), (1, 0), (1, 1))}
-
-
-def close(expected: float, rel: float):
-    return pytest.approx(expected, rel=rel, abs=0)
 
 
 def gap(length_mm: float, thin_mm: float) -> Scene:
@@ -97,18 +93,6 @@ def test_a_triangle_loses_what_it_is_said_to_lose_at_most(form, order):
     assert worst > 1e-3  # it is no wider than that
 
 
-def test_thinness_is_the_share_of_an_area_that_roundings_move():
-    """By the areas of triangles whose corners' coordinates are off by a millionth, either way: the worst of them."""
-    random = np.random.default_rng(5)
-    for _ in range(20):
-        points = random.uniform(-1, 1, (3, 2)) * [1.0, 1e-3] + random.uniform(-2, 2, 2)
-        points = points[:: int(np.sign(np.linalg.det(np.diff(points, axis=0))))]
-        mesh = Cones(Triangles(points, [(0, 1, 2)], [("air", 1.0)], {}), {})
-        moved = points * (1 + 1e-9 * random.choice([-1, 1], (1000, 3, 2)))
-        share = np.abs(np.linalg.det(np.diff(moved, axis=1)) / mesh.areas()[0] - 1).max() / 1e-9
-        assert mesh.thinness()[0] / 3 < share < 2 * mesh.thinness()[0]
-
-
 @pytest.mark.parametrize("ratio", [4.68, 100.0])
 @pytest.mark.parametrize(("length_mm", "thin_mm"), [(20.0, 1e-3), (100.0, 1e-5), (100.0, 1e-6)])
 def test_even_air_over_a_long_sensor(length_mm, thin_mm, ratio):
@@ -179,13 +163,3 @@ def test_a_disc_of_a_cut_cell_is_as_wide_as_its_bounds():
     )
     assert bounds.width() < 1e-6
     assert 0.5 * bounds.width() < disc.width() < 2 * bounds.width()
-
-
-def test_a_triangle_of_everyday_loses_nothing():
-    """Without slender triangles the allowance is a thousandth of what edges near each other get."""
-    mesh = fem2d._graded(fem2d._triangles(tri_cell(0.1))[1], EPS, 1e-6)
-    plane, (eps, _) = Plane(mesh, 9), fem2d._by_triangle(mesh, EPS)
-    u, psi = fem2d._fields(plane, eps)
-    assert fem2d._rounding(plane, eps, eps, u, psi) < 1e-3 * _fem_bounds.ROUNDING * float(
-        (eps * plane.energies(u, u)).sum()
-    )

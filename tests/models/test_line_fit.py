@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from line_cases import PLATE, TONES
 
-from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.models import line
 
 OLDER = {
@@ -55,66 +54,3 @@ def test_c5_as_printed_gives_metres():
     force, x, c, r = measured(PLATE, TONES[0])
     found = line_fit.fit(force, x, c, r, "printed").printed_position_m(c)
     assert np.nanmedian(abs(found)) > 1.0
-    with pytest.raises(OutOfRange, match="form='printed'"):
-        line_fit.fit(force, x, c, r).printed_position_m(c)
-
-
-def test_the_fit_is_least_squares():
-    rng = np.random.default_rng(3)
-    force, x = rng.uniform(0, 6, 200), rng.uniform(0, 0.09, 200)
-    r = rng.normal(size=200)
-    found = line_fit.fit(force, x, 7e-11 + 1e-12 * force, r)
-    columns = np.stack([np.ones(200), force, force * x, force * x * x], -1)
-    left = r - columns @ found.resistance
-    assert abs(columns.T @ left).max() < 1e-9  # the normal equations
-    assert found.residual_ohm == pytest.approx(np.sqrt(np.mean(left**2)))
-    assert found.capacitance == pytest.approx([7e-11, 1e-12], rel=1e-12, abs=0)
-
-
-def made(resistance, form="corrected"):
-    return line_fit.LineFit(form, np.array([7e-11, 1e-12]), np.array(resistance), 0.0)
-
-
-def test_both_roots_are_given():
-    exact = made([100.0, 1.0, 20.0, -100.0])  # 20 x - 100 x^2: two places for each rise
-    r = 100 + 2 * (1 + 20 * 0.05 - 100 * 0.05**2)
-    roots = exact.presses([7.2e-11], [r]).position_m
-    assert roots[0] == pytest.approx([0.05, 0.15])
-
-
-@pytest.mark.parametrize("square", [0.0, 1e-300, 1e-14, -1e-14])
-def test_without_a_square_the_linear_root_stays(square):
-    fit = made([100.0, 1.0, 20.0, square])
-    roots = fit.presses([7.2e-11], [100 + 2 * (1 + 20 * 0.05)])
-    assert roots.choice(0.1) == pytest.approx([0.05], rel=1e-12)
-    assert np.nanmin(abs(roots.position_m - 0.05)) < 1e-13
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_small_roots_keep_their_digits(sign):
-    fit = made([100.0, 0.0, sign * 20.0, 1e-3])
-    x = 1e-9
-    r = 100 + 2 * (sign * 20 * x)
-    near = fit.presses([7.2e-11], [r]).position_m[0]
-    assert np.nanmin(abs(near - (r - 100) / (sign * 40))) < 1e-18
-
-
-def test_no_real_root_is_nan_and_chooses_the_middle():
-    fit = made([100.0, 1.0, 20.0, -100.0])
-    roots = fit.presses([7.2e-11], [110.0])
-    assert np.isnan(roots.position_m).all()
-    assert roots.choice(0.1) == pytest.approx([0.05])
-
-
-def test_no_force_has_no_position():
-    roots = made([100.0, 1.0, 20.0, -100.0]).presses([7e-11], [100.0])
-    assert roots.force_n == pytest.approx([0.0], abs=1e-9)
-    assert np.isfinite(roots.choice(0.1)).all()
-
-
-def test_what_is_refused():
-    force, x = np.full(10, 3.0), np.linspace(0, 0.09, 10)
-    with pytest.raises(OutOfRange, match="do not determine"):
-        line_fit.fit(force, x, force, force)
-    with pytest.raises(UnknownName, match="form of the fit"):
-        line_fit.fit(force, x, force, force, "wrong")

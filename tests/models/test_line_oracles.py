@@ -23,14 +23,6 @@ def test_scikit_rf_agrees(f, whole, real):
     assert abs(theirs.real - z.real) < real * z.real
 
 
-@pytest.mark.filterwarnings("default")
-def test_scikit_rf_dies_towards_low_frequency():
-    """Nearly everything is reflected: 1 - s keeps few digits, and Re Z none. Ours is right (test_line.py)."""
-    inputs = PLATE | {"frequency_hz": 1e-3}
-    assert abs(through_scikit_rf(inputs).real - 3000) > 0.1 * 3000
-    assert line.impedance(line.PressedLine(**inputs)).real == pytest.approx(3000, rel=0.01)
-
-
 @pytest.mark.parametrize("f", [1.1e3, 99.7e3, 1e6])
 def test_ngspice_solves_the_same_ladder(f, program):
     program("ngspice", "ngspice")

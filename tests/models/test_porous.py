@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.sparse import coo_matrix, diags
-from scipy.sparse.linalg import spsolve
+from resistors import potentials
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
@@ -49,14 +48,13 @@ def gyroid(period_mm, share, layers=6, height_mm=0.1, n=20, up=2):
     dx, dz, number = period_mm / n, height_mm / up, np.arange(eps.size).reshape(eps.shape)
     pairs = [(np.roll(eps, -1, k), eps, np.roll(number, -1, k), number, dz) for k in (0, 1)]
     pairs.append((eps[..., 1:], eps[..., :-1], number[..., 1:], number[..., :-1], dx * dx / dz))
-    links = [((2 * a * b / (a + b) * by).ravel(), i.ravel(), j.ravel()) for a, b, i, j, by in pairs]
-    g, i, j = (np.concatenate(each) for each in zip(*links, strict=True))
-    ends = np.zeros((2, *eps.shape))
-    ends[0, ..., 0], ends[1, ..., -1] = 2 * eps[..., 0] * dx * dx / dz, 2 * eps[..., -1] * dx * dx / dz
-    low, high = ends.reshape(2, -1)
-    own = np.bincount(i, g, eps.size) + np.bincount(j, g, eps.size) + low + high
-    matrix = coo_matrix((np.r_[-g, -g], (np.r_[i, j], np.r_[j, i])), (eps.size,) * 2) + diags(own)
-    return low @ spsolve(matrix.tocsc(), high) * layers * height_mm / period_mm**2
+    links = [(i.ravel(), j.ravel(), (2 * a * b / (a + b) * by).ravel()) for a, b, i, j, by in pairs]
+    low, high = eps.size, eps.size + 1  # the electrodes
+    for end, k in ((low, 0), (high, -1)):
+        links.append((number[..., k].ravel(), np.full(n * n, end), (2 * eps[..., k] * dx * dx / dz).ravel()))
+    held = np.append(np.full(eps.size, np.nan), [0.0, 1.0])
+    _, current = potentials(*map(np.concatenate, zip(*links, strict=True)), held)
+    return current[high] * layers * height_mm / period_mm**2
 
 
 def test_the_range_of_a_gyroid_without_g_code_holds_its_layers():

@@ -27,20 +27,6 @@ def stairs():
     return Scene(bodies, (4.0, 8.0, 0.9))
 
 
-def test_rings_fill_the_same_place_and_share_all_sides():
-    points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.4, 0.5]], float)
-    triangles = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
-    found, cut, region = mesh.ringed(points, triangles, np.array([1, 2, 3, 4]), [4, 0], 6)
-    u, v = (found[cut[:, k]] - found[cut[:, 0]] for k in (1, 2))
-    area = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
-    assert area.min() > 0
-    assert np.bincount(region, area)[1:] == pytest.approx([0.25, 0.3, 0.25, 0.2], rel=1e-12)
-    inner, outer = mesh.of_triangles(found, cut, region), mesh.of_triangles(points, triangles, np.arange(4))
-    assert inner.lengths_m().sum() == pytest.approx(outer.lengths_m().sum(), rel=1e-12)  # no gaps within
-    near = np.sort(np.hypot(*(found - points[4]).T))[1:5]
-    assert near == pytest.approx(np.sort(np.hypot(*(points[:4] - points[4]).T)) / 64, rel=0.5)
-
-
 def test_corners_are_where_solid_and_air_or_plates_turn_and_where_three_meet():
     cell = press2d.cell(stairs(), 2.0)
     found = {(round(x, 6), round(y, 6)) for x, y in mesh.sharp_corners(cell.edges, cell.left_mm, cell.right_mm)}
@@ -90,11 +76,6 @@ def test_stairs_are_near_their_limit_on_the_mesh_that_is_used():
     assert used.displacement_m[1] == pytest.approx(finer.displacement_m[1], rel=7e-3)
     grown = [f.capacitance_f_per_m2[1].middle() - f.capacitance_f_per_m2[0].middle() for f in (used, finer)]
     assert grown[0] == pytest.approx(grown[1], rel=7e-3)
-
-
-def test_finer_levels_are_finer_at_the_apex_too():
-    assert LEVELS[1] == Fineness(5e-4, 0.025, 0.075, 0.25)
-    assert Fineness().scaled(2) == Fineness(2e-3, 0.1, 0.3, 1.0)
 
 
 def test_a_wedge_is_filled_though_its_corners_lie_on_a_line():

@@ -61,19 +61,6 @@ def holds(found, exact, width):
     assert (found.lower + found.upper) / (exact.lower + exact.upper) == pytest.approx(1, abs=width)
 
 
-def test_plates_are_exact():
-    found = prisms.capacitance(sensor([]), EPS)
-    exact = EPS0_F_PER_M * 9 * MM / (0.1 / EPS["x60"] + 0.4 / EPS["air"])
-    assert found.lower == pytest.approx(exact, rel=1e-8, abs=0)
-    assert found.upper == pytest.approx(exact, rel=1e-8, abs=0)
-
-
-@pytest.mark.parametrize("width", [3e-3])
-def test_crossed_strips_are_those_of_boxes(width):
-    scene = rect.scene(rect.Params(length_mm=4.0, width_mm=4.0, dielectric_mm=0.1), Fill())
-    holds(prisms.capacitance(scene, EPS, width), fem3d.capacitance(scene, EPS, 1e-3), width)
-
-
 def test_a_sensor_that_ends_within_a_cell_counts_its_own_part():
     scene = rect.scene(rect.Params(length_mm=12.6, width_mm=4.0, dielectric_mm=0.1), Fill())
     found, boxes = prisms.capacitance(scene, EPS, 6e-2), fem3d.capacitance(scene, EPS, 1e-2)
@@ -242,27 +229,6 @@ def test_a_part_that_occurs_more_often_is_enclosed_too(enclosed):
     found = fem.whole(fem.Energies(0.98, 1.0, 0.25, 1, enclosed=enclosed), [1.0, 2.0])
     least = 0.98 + (0.5 - (1 + enclosed) * 0.02**0.5) ** 2
     assert found.lower == pytest.approx(least, rel=1e-8)
-
-
-def test_a_cell_of_one_post_is_solved_as_its_quarter():
-    """A post that is turned a little has no mirrors: its whole cell is solved, and bounds much the same value."""
-
-    def one_post(turn_deg):
-        corners = [(1 + 0.6 * np.cos(a), 1 + 0.6 * np.sin(a)) for a in np.radians(np.arange(0, 360, 45) + turn_deg)]
-        return Scene(
-            (
-                Body("low", "etpu", (box(0, 2, 0, 2, 0, 0.2),), "bottom"),
-                Body("post", "etpu", (Prism("z", tuple(corners), 0.5, 0.9), box(0, 2, 0, 2, 0.9, 1.0)), "top"),
-            ),
-            (2.0, 2.0, 1.0),
-        )
-
-    quarter, whole = (prisms._cell(one_post(turn)) for turn in (22.5, 10.0))
-    assert (quarter.x.high_mm, quarter.y.high_mm, quarter.x.shares.tolist()) == (1.0, 1.0, [2.0])
-    assert (whole.x.high_mm, whole.y.high_mm) == (2.0, 2.0)
-    a, b = (prisms.capacitance(one_post(turn), {"air": 1.0}, 1e-2) for turn in (22.5, 10.0))
-    assert max(a.lower, b.lower) < min(a.upper, b.upper)
-    assert a.middle() == pytest.approx(b.middle(), rel=5e-3)
 
 
 @pytest.mark.parametrize(("low", "size", "whole"), [(0.3, 1.0, 2.8), (0.75, 1.0, 5.2), (0.0, 2.0, 9.0)])

@@ -1,4 +1,4 @@
-"""Bounds of force and place: against the line's, against a plain inverse, and by symmetry."""
+"""Bounds of force and place: against the line's, and against a plain inverse."""
 
 import re
 from dataclasses import replace
@@ -27,28 +27,18 @@ def found(name, tones=TONES, places=5, noise=1e-3, film=FILM):
 
 
 def test_on_a_strip_pressed_across_it_is_the_bound_of_the_line():
-    strip = Sheet(0.1, 0.01, (0.07 / 3e-4, 0.2 / 3e-4), C)
-    strain, tones = 0.05, np.array(TONES) * 10
+    strip, strain, tones = Sheet(0.1, 0.01, (0.07 / 3e-4, 0.2 / 3e-4), C), 0.05, np.array(TONES) * 10
     force = strain * 1e-4 * PLATE["modulus_pa"]
     tip = SheetPatch(0.0, 0.0, 0.01, 0.01, 1 / (1 - strain))
-    got = localise(
-        strip,
-        contact_sets(strip)["one-edge"],
-        tones,
-        tip,
-        {"capacitance_factor": strain / force / (1 - strain) ** 2},
-        1e-3,
-        5,
-    )
-    at = got.x_m - 0.005
-    inputs = PLATE | {"force_n": force, "frequency_hz": tones, "left_m": at[:, None]}
+    per_newton = {"capacitance_factor": strain / force / (1 - strain) ** 2}
+    got = localise(strip, contact_sets(strip)["one-edge"], tones, tip, per_newton, 1e-3, 5)
+    inputs = PLATE | {"force_n": force, "frequency_hz": tones, "left_m": got.x_m[:, None] - 0.005}
     z, by = line.sensitivities(line.PressedLine(**inputs), of=["force_n", "left_m"])
     g = np.stack([by["force_n"], by["left_m"]], axis=-1) / z[..., None]
     rows = np.concatenate([g.real, g.imag], axis=1) / 1e-3
     covariance = np.linalg.inv(np.einsum("pka,pkb->pab", rows, rows))
     sigma = got.sigma()[:, 2]
-    assert sigma[:, 0] == pytest.approx(np.sqrt(covariance[:, 0, 0]), rel=0.03)
-    assert sigma[:, 1] == pytest.approx(np.sqrt(covariance[:, 1, 1]), rel=0.03)
+    assert sigma[:, :2] == pytest.approx(np.sqrt(np.einsum("paa->pa", covariance)), rel=0.03)
     assert np.isinf(sigma[:, 2]).all()
 
 
@@ -60,25 +50,6 @@ def test_one_reading_does_not_locate_and_several_do_better():
     assert np.isfinite(sigma["one-edge"][0, 0]).all()  # open only on the axis of symmetry, elsewhere just wide
     assert (medians["corner"] > 1.0).all()
     assert medians["opposite"][1] > 1.0
-
-
-@pytest.mark.parametrize("name", ["corners", pytest.param("two-edges", marks=pytest.mark.nightly)])
-def test_resistive_sheets_and_higher_tones_do_better(name):
-    base = np.median(found(name).sigma()[..., 1])
-    resistive = Sheet(0.1, 0.1, (2800.0, 2800.0), C)
-    assert np.median(found(name, film=resistive).sigma()[..., 1]) < base / 2
-    assert np.median(found(name, tones=np.array(TONES) * 10).sigma()[..., 1]) < base / 2
-
-
-@pytest.mark.parametrize("name", ["two-edges", "corners", "corner"])
-def test_a_square_with_equal_sheets_does_not_tell_x_from_y(name):
-    sigma = found(name, places=3).sigma()
-    np.testing.assert_allclose(sigma[..., 1], sigma[..., 2].T, rtol=1e-4)
-
-
-def test_noise_scales_the_error():
-    one, two = (found("corners", places=2, noise=noise).sigma() for noise in (1e-3, 5e-3))
-    np.testing.assert_allclose(two, 5 * one, rtol=1e-6)
 
 
 def test_information_is_that_of_each_tone_and_its_inverse_the_covariance():
@@ -95,14 +66,6 @@ def test_information_is_that_of_each_tone_and_its_inverse_the_covariance():
     assert got.sigma()[1, 0] == pytest.approx(np.sqrt(np.diag(covariance)), rel=1e-5)
     known = np.linalg.inv(rows.T @ rows + np.diag([0.0, 1200.0, 1200.0]))
     assert got.sigma(outline=True)[1, 0] == pytest.approx(np.sqrt(np.diag(known)), rel=1e-5)
-
-
-def test_with_the_outline_known_no_place_is_worse_than_a_guess():
-    for name in SETS:
-        got = found(name, places=3)
-        sigma = got.sigma(outline=True)
-        assert (sigma[..., 1:] <= 0.1 / 12**0.5 * (1 + 1e-9)).all()
-        assert (sigma <= got.sigma() * (1 + 1e-9)).all()
 
 
 def test_the_best_tone_is_the_highest_where_all_are_low():

@@ -29,20 +29,8 @@ def test_no_frequency_and_no_leak():
         solve(FILM, [PORT], [1e3, 0.0], SheetPatch(0, 0, 0.01, 0.01, 1.1), of=["x_m"], cells=10)
 
 
-def test_no_film_at_all_is_the_same():
-    z = impedance(replace(FILM, capacitance_f_per_m2=0.0), [PORT, ALONG], 1e3, cells=10)[0]
-    assert np.isinf(z[0, 0])
-    assert z[1, 1] == pytest.approx(900.0)
-
-
-@pytest.mark.parametrize("hertz", [1e8, 1e12])
-def test_current_that_does_not_reach_across_a_cell_is_refused(hertz):
-    with pytest.raises(OutOfRange, match=r"grid too coarse: at 1e\+\d+ Hz .* use \d+ cells or more"):
-        impedance(FILM, [PORT], hertz, cells=20)
-
-
 def test_the_resolution_it_asks_for_is_taken():
-    with pytest.raises(OutOfRange) as said:
+    with pytest.raises(OutOfRange, match=r"grid too coarse: at 1e\+08 Hz .* use \d+ cells or more") as said:
         impedance(FILM, [PORT], 1e8, cells=20)
     cells = int(str(said.value).split("use ")[1].split()[0])
     assert np.isfinite(impedance(FILM, [PORT], 1e8, cells=cells)).all()

@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 from line_cases import cases
+from resistors import ladder, potentials
 
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models import line, stack
@@ -182,25 +183,10 @@ def test_sections_of_no_length_and_cuts_change_nothing():
 
 def nodal(r, y, length, cells, ends):
     """Impedance of a ladder of resistors and capacitors, by Kirchhoff's law at each node."""
-    n, step = len(r), length / cells
-    size = n * (cells + 1)
-    g = np.zeros((size, size), complex)
-
-    def join(a, b, value):
-        g[[a, b], [a, b]] += value
-        g[[a, b], [b, a]] -= value
-
-    for cell in range(cells + 1):
-        for k in range(n - 1):
-            join(n * cell + k, n * cell + k + 1, y[k] * step * (0.5 if cell in (0, cells) else 1.0))
-        for k in range(n if cell < cells else 0):
-            join(n * cell + k, n * (cell + 1) + k, 1 / (r[k] * step))
-    current = np.zeros(size, complex)
-    current[ends[0]], current[ends[1]] = 1.0, -1.0
-    kept = np.arange(1, size)  # the first node is at 0
-    potential = np.zeros(size, complex)
-    potential[kept] = np.linalg.solve(g[np.ix_(kept, kept)], current[kept])
-    return potential[ends[0]] - potential[ends[1]]
+    held = np.full(len(r) * (cells + 1), np.nan)
+    held[list(ends)] = 1.0, 0.0
+    _, current = potentials(*map(np.array, zip(*ladder(r, y, length, cells), strict=True)), held)
+    return 1 / current[ends[0]]
 
 
 @pytest.mark.parametrize("ends", [(1, 0), (2, 1), (2, 0)])
@@ -215,36 +201,6 @@ def test_a_ladder_of_tracks_tends_to_it_at_second_order(ends):
         ratios = [part(a) / part(b) for a, b in pairwise(errors)]
         assert ratios == pytest.approx([4, 4], rel=0.05)
     assert abs(errors[-1]) < 1e-3 * abs(z)
-
-
-def test_a_current_through_one_film_shows_at_the_other_as_the_shared_track():
-    """Film 2 open: at low frequency a third of the middle track's voltage, against the first one's sense."""
-    z = stack.impedance([[23e3, 67e3, 23e3]], [[2j * np.pi * 1e-3 * 7e-10] * 2], [0.1])
-    assert z[0, 1].real == pytest.approx(-6700 / 3, rel=1e-9)
-    assert z[0, 0].real == pytest.approx((2300 + 6700) / 3, rel=1e-9)
-
-
-def test_it_is_reciprocal_passive_and_mirrors():
-    tracks, films = STACKS["three films"]
-    y = [2j * np.pi * 3e5 * c for c in films]
-    z = stack.impedance([tracks], [y], [0.1])
-    assert z == pytest.approx(z.T, rel=1e-13)
-    assert np.linalg.eigvalsh(z.real).min() > 0
-    mirrored = stack.impedance([tracks[::-1]], [y[::-1]], [0.1])
-    assert mirrored == pytest.approx(z[::-1, ::-1], rel=1e-13)
-
-
-def test_arrays_broadcast():
-    f = np.array([1e3, 1e5, 1e7])[:, None]
-    length = np.array([0.01, 0.1])
-    z = stack.impedance([[1e4, 2e4, 3e4]], [[2j * np.pi * f * 7e-10, 2j * np.pi * f * 3e-10]], [length])
-    assert z.shape == (3, 2, 2, 2)
-    for i in range(3):
-        for k in range(2):
-            y = [2j * np.pi * f[i, 0] * c for c in (7e-10, 3e-10)]
-            one = stack.impedance([[1e4, 2e4, 3e4]], [y], [length[k]])
-            assert z[i, k] == pytest.approx(one, rel=1e-14)
-            assert z[i, k].real == pytest.approx(one.real, rel=1e-13)
 
 
 def test_where_nothing_flows_the_impedance_is_infinite():
@@ -397,12 +353,6 @@ def test_it_refuses_a_derivative_at_frequency_0_and_stacks_that_are_none():
 def test_presses_that_do_not_broadcast_are_refused():
     with pytest.raises(BadInput, match=r"frequency and press do not broadcast together: \(2,\), \(3,\)"):
         DOUBLE.response([1e3, 1e4], Press([1.0, 2.0, 3.0], 0.03, 0.01))
-
-
-def test_tracks_and_films_count_from_the_bottom():
-    """The soft film is the upper one: its entry moves more."""
-    by = DOUBLE.response(1.1e3, Press(1.0, 0.04, 0.01)).by_force_ohm_per_n
-    assert abs(by[1, 1]) > 4 * abs(by[0, 0])
 
 
 def test_standard_errors_are_those_of_the_fisher_matrix():

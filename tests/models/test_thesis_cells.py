@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from cell_scenes import EPS, MM, rect_cell, tri_cell
+from cell_scenes import CELLS, EPS, MM, close, rect_cell
 from scipy.integrate import quad
 
 from sensorgen.core.errors import OutOfRange
@@ -15,11 +15,6 @@ from sensorgen.models import columns, fem2d, fem3d, thesis_cells
 from sensorgen.scene.scene import Fill
 
 CONTACT = json.loads((Path(__file__).parents[1] / "reference" / "contact.json").read_text("utf-8"))
-CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
-
-
-def close(expected: float, rel: float):
-    return pytest.approx(expected, rel=rel, abs=0)
 
 
 @pytest.mark.parametrize("film", [0.05, 0.1, 0.2])
@@ -73,13 +68,6 @@ def test_strips_of_their_own_widths_are_the_columns(heights):
     found = columns.capacitance(rect_cell(0.1, **heights), EPS | {"air": 1.0})
     own = thesis_cells.strips_f_per_m2(rect.Params(dielectric_mm=0.1, **heights), 4.68, even=False) * (2 * MM) ** 2
     assert own == close(found.lower, 1e-9)
-
-
-def test_triangles_are_the_columns():
-    found = columns.capacitance(tri_cell(0.1), EPS | {"air": 1.0})
-    assert thesis_cells.triangles_f_per_m2(tri.Params(dielectric_mm=0.1), 4.68) * 2 * MM * MM == close(
-        found.lower, 1e-9
-    )
 
 
 def test_bulging_vanishes_at_rest_when_corrected():

@@ -81,26 +81,6 @@ def test_lines_that_cross_aslant_share_a_longer_place():
     assert found.ratio == pytest.approx((path * along + 2 * joint) / (along * 21e-3), rel=1e-9)
 
 
-def test_a_turned_sensor_of_many_directions_lies_between_both_axes():
-    contact = 1e-4
-    found = [
-        ratio(plate(20.0, 9.24, W * 1e3, H * 1e3, [a, a + 90, a]), contact, area=3 * H * 9.24e-3) for a in (0, 45, 90)
-    ]
-    assert found[0] < found[1] < found[2]
-    assert found[2] / found[0] > 1.1
-
-
-def test_contacts_can_only_add():
-    lines = plate(20.0, 9.24, W * 1e3, H * 1e3, [30, 120, 30])
-    found = [ratio(lines, c, area=3 * H * 9.24e-3) for c in (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)]
-    assert found == sorted(found)
-
-
-def test_a_mirrored_plate_is_the_same_plate():
-    one, other = (plate(20.0, 9.24, W * 1e3, H * 1e3, [a, a + 90]) for a in (30, 150))
-    assert ratio(one, 1e-5) == pytest.approx(ratio(other, 1e-5), rel=0.01)
-
-
 def test_a_piece_counts_the_same_wherever_it_stands_in_the_file():
     """After very many others that touch nothing: what is left of a number's digits still tells its nodes apart."""
     plated, n = plate(20.0, 5.0, W * 1e3, H * 1e3, [0, 90]), 100_000
@@ -147,20 +127,6 @@ def test_nonsense_is_refused(rho, contact, ends, area, word):
 def test_lines_that_do_not_meet_conduct_nothing():
     with pytest.raises(OutOfRange, match="no line conducts"):
         ratio(strips(12, "y"), np.inf, (-2e-3, 2e-3))
-
-
-@pytest.mark.parametrize("angles", [(90, 0), (30, 120, 75)])
-def test_no_pieces_that_touch_are_overlooked(angles):
-    """Every pair of pieces, of one layer or of neighbouring ones, whose middles come within a width and a third."""
-    lines = plate(5.0, 4.0, W * 1e3, H * 1e3, angles)
-    share = np.linspace(0, 1, 60)[:, None]
-    points = lines.start_m[:, None] + share * (lines.end_m - lines.start_m)[:, None]
-    found = set(zip(*(side.tolist() for side in links.near(lines)), strict=True))
-    for a in range(len(lines)):
-        for b in range(a + 1, len(lines)):
-            if abs(lines.layer[a] - lines.layer[b]) <= 1 and (a, b) not in found:
-                gap = points[a][:, None] - points[b][None]
-                assert np.hypot(*gap.T).min() > 1.3 * W, (a, b)
 
 
 @pytest.mark.parametrize("contact", [0.0, 1e-6, 1e-3])

@@ -11,9 +11,8 @@ from itertools import pairwise
 from math import exp, log, pi
 
 import numpy as np
+from resistors import potentials
 from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
-from scipy.sparse import csr_array
-from scipy.sparse.linalg import spsolve
 
 from sensorgen.analysis.characterise import catalogue
 from sensorgen.analysis.characterise.posterior import Observation
@@ -122,31 +121,25 @@ def _bar_ohm(share, flow, degrees, width_mm, per_line, corner, pitches):
         ends.append((n, first, last))
     where = np.array(where)
     area = p * flow * LAYER_MM  # of a line [mm2], of resistivity 1
-    rows, cols, values = [], [], []
-
-    def join(a, b, g):
-        rows.extend([a, b, a, b]), cols.extend([a, b, b, a]), values.extend([g, g, -g, -g])
-
+    links = []
     contact = LAYER_MM * step / (p * (1 + share))
     for (n, j), a in nodes.items():
         if (n, j + 1) in nodes:
-            join(a, nodes[n, j + 1], area / step)
+            links.append((a, nodes[n, j + 1], area / step))
         if (n + 1, j) in nodes:  # half of it at an end of what both lines have
             inside = {(m, j + d) in nodes for m in (n, n + 1) for d in (-1, 1)} == {True}
-            join(a, nodes[n + 1, j], contact if inside else contact / 2)
+            links.append((a, nodes[n + 1, j], contact if inside else contact / 2))
     sides = {n: (first, last) for n, first, last in ends}
     for n, span in sides.items():
         if n + 1 in sides and degrees:
             k = n % 2
-            join(nodes[n, span[k]], nodes[n + 1, sides[n + 1][k]], area / p)
-            join(nodes[n, span[1 - k]], nodes[n + 1, sides[n + 1][1 - k]], contact * per_line * corner)
-    size = len(where)
-    matrix = csr_array((values, (rows, cols)), shape=(size, size)).tocsr()
+            links.append((nodes[n, span[k]], nodes[n + 1, sides[n + 1][k]], area / p))
+            links.append((nodes[n, span[1 - k]], nodes[n + 1, sides[n + 1][1 - k]], contact * per_line * corner))
     x, reach = where[:, 0], pitches * p / 2
-    u = np.where(x > 0, 1.0, 0.0)
-    free = np.flatnonzero(np.abs(x) < reach - 1e-6)
-    u[free] = spsolve(matrix[free][:, free].tocsc(), -(matrix @ np.where(np.abs(x) < reach - 1e-6, 0.0, u))[free])
-    return 1.0 / float(u @ (matrix @ u))
+    held = np.where(np.abs(x) < reach - 1e-6, np.nan, np.where(x > 0, 1.0, 0.0))
+    a, b, g = (np.array(of) for of in zip(*links, strict=True))
+    u, current = potentials(a, b, g, held)
+    return 1.0 / float(u @ current)
 
 
 def ladder_ohm(along, through, contact, gap_mm, width_mm, height_mm):
@@ -155,27 +148,14 @@ def ladder_ohm(along, through, contact, gap_mm, width_mm, height_mm):
     nx, nz = round((2 * strip + gap_mm) / d), 16
     dx, dz, w = d * 1e-3, height_mm * 1e-3 / nz, width_mm * 1e-3
     gx, gz = w * dz / (along * dx), w * dx / (through * dz)
-    n = nx * nz
-    index = np.arange(n).reshape(nx, nz)
-    rows, cols, values = [], [], []
-
-    def join(a, b, g):
-        rows.extend([a, b, a, b]), cols.extend([a, b, b, a])
-        values.extend([np.full(a.size, s * g) for s in (1, 1, -1, -1)])
-
-    join(index[:-1].ravel(), index[1:].ravel(), gx)
-    join(index[:, :-1].ravel(), index[:, 1:].ravel(), gz)
-    x = (np.arange(nx) + 0.5) * d
-    top, right = index[:, -1], np.zeros(n)
-    ends = np.zeros(n)
-    for under, sigma, u in ((x < strip, contact[0], 0.0), (x > strip + gap_mm, contact[1], 1.0)):
-        g = w * dx / (sigma + through * dz / 2)
-        ends[top[under]] += g
-        right[top[under]] += g * u
-    rows.append(np.arange(n)), cols.append(np.arange(n)), values.append(ends)
-    matrix = csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))), shape=(n, n))
-    potential = spsolve(matrix.tocsc(), right)
-    return 1.0 / float(((1 - potential[top]) * ends[top])[x > strip + gap_mm].sum())
+    index = np.arange(nx * nz).reshape(nx, nz)
+    links = [(index[:-1], index[1:], gx), (index[:, :-1], index[:, 1:], gz)]
+    x, held = (np.arange(nx) + 0.5) * d, np.append(np.full(nx * nz, np.nan), [0.0, 1.0])
+    for k, under in enumerate((x < strip, x > strip + gap_mm)):
+        links.append((index[under, -1], nx * nz + k, w * dx / (contact[k] + through * dz / 2)))
+    ends = [[of.ravel() for of in np.broadcast_arrays(*link)] for link in links]
+    _, current = potentials(*map(np.concatenate, zip(*ends, strict=True)), held)
+    return 1.0 / float(current[-1])
 
 
 def _graded(stops, step, growth=1.25):
@@ -212,16 +192,11 @@ def plate_f(thickness_mm, permittivity, radius_mm=catalogue.PLATE_RADIUS_MM, ste
         for area, i in ((inner, 0), (outer, 1))
     ]
     a, b, g = (np.concatenate([link[k].ravel() for link in links]) for k in range(3))
-    n = nr * nz
-    rows, cols = np.concatenate([a, b, a, b]), np.concatenate([a, b, b, a])
-    matrix = csr_array((np.concatenate([g, g, -g, -g]), (rows, cols)), shape=(n, n)).tocsr()
     near = 1e-9
     lower = (r[:, None] <= rim + near) & (z >= -near) & (z <= e + near)
     upper = (r[:, None] <= radius_mm + near) & (z >= e + t - near) & (z <= e + t + catalogue.UPPER_MM + near)
-    u = np.where(upper, 0.5, np.where(lower, -0.5, 0.0)).ravel()
-    free = np.flatnonzero(~(lower | upper).ravel())
-    u[free] = spsolve(matrix[free][:, free].tocsc(), -(matrix @ u)[free])
-    return float(2 * pi * EPS0 * 1e-3 * (u @ (matrix @ u)))
+    u, charge = potentials(a, b, g, np.where(upper, 0.5, np.where(lower, -0.5, np.nan)).ravel())
+    return float(2 * pi * EPS0 * 1e-3 * (u @ charge))
 
 
 @lru_cache

@@ -8,24 +8,7 @@ taken for conductor above, those that it fills below.
 """
 
 import numpy as np
-from scipy.sparse import coo_matrix, diags
-from scipy.sparse.linalg import cg
-
-
-def solved(count, edges, conductance, held):
-    """Energy of nodes joined by resistors, some held at a voltage."""
-    one, other = edges
-    joined = coo_matrix(
-        (np.concatenate([-conductance, -conductance]), (np.append(one, other), np.append(other, one))), (count, count)
-    ).tocsr()
-    matrix = joined - diags(np.asarray(joined.sum(1)).ravel())
-    u = np.where(np.isnan(held), 0.0, held)
-    free = np.isnan(held) & (matrix.diagonal() > 0)
-    inner = matrix[free][:, free]
-    found, info = cg(inner, -(matrix @ u)[free], rtol=1e-8, M=diags(1 / inner.diagonal()), maxiter=5000)
-    assert info == 0
-    u[free] = found
-    return float(u @ (matrix @ u))
+from resistors import potentials, sides
 
 
 def upper(eps, metal, h):
@@ -38,34 +21,33 @@ def upper(eps, metal, h):
         for corner in np.ndindex(2, 2, 2):
             held[tuple((here + corner).T)] = end
     weight = np.pad(np.where(metal < 0, eps, 0.0), 1) * h / 4
-    ones, others, conductances = [], [], []
+    edges = []
     for axis in range(3):
         first, second = (a for a in range(3) if a != axis)
         total = sum(np.roll(np.roll(weight, i, first), j, second) for i in (0, -1) for j in (0, -1))
-        low = np.delete(number, -1, axis)
         cut = [slice(0, -1)] * 3
         cut[axis] = slice(1, -1)
-        ones.append(low.ravel())
-        others.append(np.delete(number, 0, axis).ravel())
-        conductances.append(total[tuple(cut)].ravel())
-    return solved(
-        number.size, (np.concatenate(ones), np.concatenate(others)), np.concatenate(conductances), held.ravel()
-    )
+        edges.append((*sides(number, axis), total[tuple(cut)].ravel()))
+    return energy(edges, held)
 
 
 def lower(eps, metal, h):
     """Over eps0 [mm]; as :func:`upper`."""
     number = np.arange(eps.size).reshape(eps.shape)
-    held = np.where(metal < 0, np.nan, metal).ravel().astype(float)
+    held = np.where(metal < 0, np.nan, metal)
     half = np.where(metal < 0, 0.5 / eps, 0.0)  # from the middle of a voxel to its face
-    ones, others, resistances = [], [], []
+    edges = []
     for axis in range(3):
-        ones.append(np.delete(number, -1, axis).ravel())
-        others.append(np.delete(number, 0, axis).ravel())
-        resistances.append((np.delete(half, -1, axis) + np.delete(half, 0, axis)).ravel())
-    one, other, resistance = map(np.concatenate, (ones, others, resistances))
-    real = resistance > 0
-    return solved(eps.size, (one[real], other[real]), h / resistance[real], held)
+        resistance = sum(sides(half, axis))
+        real = resistance > 0
+        edges.append((*(end[real] for end in sides(number, axis)), h / resistance[real]))
+    return energy(edges, held)
+
+
+def energy(edges, held):
+    """Of nodes joined by resistors, some held at a voltage."""
+    u, current = potentials(*map(np.concatenate, zip(*edges, strict=True)), held.ravel())
+    return float(u @ current)
 
 
 def voxels(size, h, part, film_mm):

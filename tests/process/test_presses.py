@@ -118,6 +118,12 @@ LAWS = {
 }
 
 
+def drift_of(run, force_n=None, **how):
+    """Drift of a run whose readings all count."""
+    valid = np.ones(len(run.time_s), bool)
+    return drift.fitted(run.time_s, run.impedance_ohm, valid, run.force_n if force_n is None else force_n, **how)
+
+
 def check_drift(found, run):
     """The course of the drift is known to a third of one reading's noise, where it begins to less."""
     off = (found.at(run.time_s) - run.drift)[run.time_s > 1]
@@ -131,20 +137,18 @@ def check_drift(found, run):
 @pytest.mark.parametrize("law", LAWS)
 def test_the_fit_of_the_drift_follows_laws_that_are_not_its_own(law):
     run = made.run(made.presses(15, most_n=3.0), rate_hz=70, law=LAWS[law])
-    valid = np.ones(len(run.time_s), bool)
-    check_drift(drift.fitted(run.time_s, run.impedance_ohm, valid, run.force_n), run)
+    check_drift(drift_of(run), run)
 
 
 def test_drift_is_fitted_to_the_rest_and_taken_out():
     run = made.run(made.presses(15, most_n=3.0), rate_hz=70, creep=0.02, slope_per_s=2e-5)
-    valid = np.ones(len(run.time_s), bool)
-    found = drift.fitted(run.time_s, run.impedance_ohm, valid, run.force_n)
+    found = drift_of(run)
     check_drift(found, run)
     left = found.fit.left * (70 * drift.BIN_S) ** 0.5  # means of so many readings
     np.testing.assert_allclose(left.real.std(axis=0), 1e-3, rtol=0.15)
     np.testing.assert_allclose(left.imag.std(axis=0), 1e-3, rtol=0.15)
     with pytest.raises(BadInput, match="0 readings at rest"):
-        drift.fitted(run.time_s, run.impedance_ohm, valid, run.force_n + 1)
+        drift_of(run, run.force_n + 1)
 
 
 @pytest.mark.parametrize(
@@ -160,8 +164,7 @@ def test_drift_is_fitted_to_the_rest_and_taken_out():
 )
 def test_the_law_that_drift_follows_is_told_with_its_reason(law, name):
     run = made.run(made.presses(30), rate_hz=70, law=law)
-    valid = np.ones(len(run.time_s), bool)
-    found = drift.fitted(run.time_s, run.impedance_ohm, valid, run.force_n)
+    found = drift_of(run)
     assert found.law == name
     assert drift.LAWS[name] in found.reason
     assert "BIC higher of" in found.reason
@@ -170,10 +173,9 @@ def test_the_law_that_drift_follows_is_told_with_its_reason(law, name):
 def test_time_constants_of_a_film_come_back():
     law = lambda t, f: made.answering(0.01, 2.0)(t, f) + made.answering(0.01, 30.0)(t, f)  # noqa: E731
     run = made.run(made.presses(30), rate_hz=70, law=law)
-    valid = np.ones(len(run.time_s), bool)
     force = run.force_n.copy()
     force[500:600] = np.nan  # the rig was silent
-    found = drift.fitted(run.time_s, run.impedance_ohm, valid, force)
+    found = drift_of(run, force)
     taus = sorted(term.tau_s for term in found.fit.terms if isinstance(term, drift.Relaxation))
     assert taus[:2] == pytest.approx([2, 30], rel=0.05)
     off = (found.at(run.time_s) - run.drift)[force > 0.4]
@@ -182,13 +184,12 @@ def test_time_constants_of_a_film_come_back():
 
 def test_a_law_that_is_asked_for_is_taken():
     run = made.run(made.presses(8), rate_hz=70, law=made.answering(0.01, 2.0))
-    valid = np.ones(len(run.time_s), bool)
     for name in drift.LAWS:
-        assert drift.fitted(run.time_s, run.impedance_ohm, valid, run.force_n, among=[name]).law == name
+        assert drift_of(run, among=[name]).law == name
     with pytest.raises(UnknownName, match="unknown law of drift 'cubic'"):
-        drift.fitted(run.time_s, run.impedance_ohm, valid, run.force_n, among=["cubic"])
+        drift_of(run, among=["cubic"])
     with pytest.raises(BadInput, match="no law of drift to choose from"):
-        drift.fitted(run.time_s, run.impedance_ohm, valid, run.force_n, among=[])
+        drift_of(run, among=[])
 
 
 def test_little_rest_takes_a_simple_law():

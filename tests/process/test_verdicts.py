@@ -4,6 +4,7 @@ from math import inf, isnan, nan
 
 import numpy as np
 import pytest
+from line_cases import PLATE
 from scipy import stats
 
 from sensorgen.core.errors import OutOfRange
@@ -23,31 +24,9 @@ from sensorgen.models import line
 
 @pytest.mark.parametrize("leak", [1e-12, 1e-6, 1e-3, 0.1, 10.0])
 def test_the_leak_is_that_of_the_line_model(leak):
-    rho, length, thickness, width = 0.07, 0.1, 0.4e-3, 0.02
-    z = line.impedance(
-        line.PressedLine(
-            frequency_hz=1e-9,
-            force_n=0.0,
-            modulus_pa=1e6,
-            left_m=0.0,
-            tip_m=0.01,
-            length_m=length,
-            width_m=width,
-            top_thickness_m=thickness,
-            bottom_thickness_m=thickness,
-            top_resistivity_ohm_m=rho,
-            bottom_resistivity_ohm_m=rho,
-            film_m=1e-4,
-            eps_r=4.0,
-            tan_delta=0.0,
-            leak_s_per_m=leak / length,
-            top_piezoresistance_per_n=0.0,
-            bottom_piezoresistance_per_n=0.0,
-            far_end="open",
-        )
-    )
-    ry = rho * length / (thickness * width)
-    assert leak_s(float(z.real), ry) == pytest.approx(leak, rel=1e-6)
+    changes = {"bottom_resistivity_ohm_m": 0.07, "force_n": 0.0, "frequency_hz": 1e-9, "leak_s_per_m": leak / 0.1}
+    z = line.impedance(line.PressedLine(**PLATE | changes))
+    assert leak_s(float(z.real), 0.07 * 0.1 / (3e-4 * 0.01)) == pytest.approx(leak, rel=1e-6)
 
 
 def test_leaks_at_their_limits():
@@ -163,12 +142,8 @@ def test_many_groups_are_held_against_pearsons_test():
 
 
 def test_groups_count_what_is_known_only():
-    made = [
-        Evidence("a", (600.0,), (inf,), 600.0),
-        Evidence("b", (600.0,), (30.0,), 600.0),
-        Evidence("c", (600.0,), (), 600.0),
-        Evidence("d", (600.0,), (9e6,), 600.0),
-    ]
+    across = {"a": (inf,), "b": (30.0,), "c": (), "d": (9e6,)}
+    made = [Evidence(name, (600.0,), read, 600.0) for name, read in across.items()]
     keys = [("tri", 0.1)] * 3 + [("rect", None)]
     found = groups((key, of, verdict(of)) for key, of in zip(keys, made, strict=True))
     assert [g.key for g in found] == [("rect", None), ("tri", 0.1)]

@@ -100,26 +100,6 @@ def test_what_cannot_be_demodulated_is_refused():
         phasors(u[:500], RATE, TONES)
 
 
-def coincidences(tones_hz):
-    """Tones that coincide with distortion products of others."""
-    tones = [float(f) for f in np.atleast_1d(np.asarray(tones_hz, float))]
-    hits = [(hit, f"{n} x {f:g} Hz") for f in tones for n in range(2, 12) for hit in tones if hit == n * f]
-    pairs = [(a, b) for a in tones for b in tones if a != b]
-    hits += [(hit, f"2 x {a:g} + {b:g} Hz") for a, b in pairs for hit in tones if hit == 2 * a + b]
-    for a, b in pairs:
-        product = f"2 x {a:g} - {b:g} Hz" if 2 * a > b else f"{b:g} - 2 x {a:g} Hz"
-        hits += [(hit, product) for hit in tones if hit == abs(2 * a - b) != b]
-    return hits
-
-
-def test_no_tone_of_the_thesis_is_a_harmonic_one_is_a_difference_and_all_fit_into_ten_milliseconds():
-    assert coincidences(TONES) == [(49900, "2 x 19900 + 10100 Hz"), (10100, "49900 - 2 x 19900 Hz")]  # one relation
-    assert (TONES % 100 == 0).all()
-    misprinted = np.where(TONES == 49900, 4990, TONES)  # as one table of the thesis has it
-    assert window_samples(1e6, misprinted) == 100_000
-    assert coincidences([1000, 3000, 5000, 7000])
-
-
 def test_cubic_distortion_of_the_instrument_falls_on_three_tones_more_than_on_the_others():
     """A voltage u + k u^3 of unit tones: each has its own terms of third order; 49.9 = 2 x 19.9 + 10.1 adds others."""
     t = np.arange(10_000) / RATE

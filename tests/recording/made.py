@@ -63,17 +63,9 @@ def force_at(time_s, made, ramp_s=0.2):
 
 
 def run(
-    made,
-    rate_hz=140.0,
-    noise=1e-3,
-    creep=0.0,
-    slope_per_s=0.0,
-    seed=1,
-    of=None,
-    tones_hz=TONES_HZ,
-    law=None,
+    made, rate_hz=140.0, noise=1e-3, creep=0.0, slope_per_s=0.0, seed=1, of=None, tones_hz=TONES_HZ, law=None,
     ramp_s=0.2,
-):
+):  # fmt: skip
     of = of or sensor()
     rng = np.random.default_rng(seed)
     time = np.arange(round((made[-1][1] + 4) * rate_hz)) / rate_hz

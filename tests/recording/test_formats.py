@@ -286,18 +286,16 @@ def test_unpacking_is_bounded(tmp_path, monkeypatch, tree):
 
 
 def test_a_header_that_claims_a_hundred_gigabytes_allocates_nothing(tmp_path):
-    huge = 0xFFFFFFF0
-    dims = struct.pack("<II", 5, 8) + struct.pack("<ii", 100_000, 125_000)
-    flags = struct.pack("<IIII", 6, 8, 6, 0)
-    name = struct.pack("<II", 1, 14) + b"impedance_data\0\0"
+    def element(kind, size, data):
+        return struct.pack("<II", kind, size) + data
+
+    huge, dims = 0xFFFFFFF0, element(5, 8, struct.pack("<ii", 100_000, 125_000))
+    name = element(1, 14, b"impedance_data\0\0")
+    array, cells = (element(6, 8, struct.pack("<II", kind, 0)) for kind in (6, 2))
     for body in (
-        struct.pack("<II", 14, huge) + flags + dims + name,
-        struct.pack("<II", 14, 80) + flags + dims + name + struct.pack("<II", 9, huge) + b"\0" * 24,
-        struct.pack("<II", 14, 72)
-        + struct.pack("<IIII", 6, 8, 2, 0)
-        + dims
-        + name
-        + struct.pack("<IIII", 0x40005, 32, 1, 0),
+        element(14, huge, array + dims + name),
+        element(14, 80, array + dims + name + element(9, huge, b"\0" * 24)),
+        element(14, 72, cells + dims + name + element(0x40005, 32, struct.pack("<II", 1, 0))),
     ):
         file = tmp_path / "huge.mat"
         head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"

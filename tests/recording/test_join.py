@@ -13,7 +13,6 @@ from sensorgen.measure.recording.rig import _covariance
 from sensorgen.measure.recording.samples import blank, rebuilt, sifted
 
 MADE = made.presses(12)
-END = MADE[-1][1] + 4
 
 
 def recording(run, skew=0.0, stamped=True):

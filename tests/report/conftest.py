@@ -39,12 +39,8 @@ def recorded(tmp_path_factory):
     with Log(folder / "log.db", create=True) as log:
         log.add(predicted_rows(design))
         for k, name in enumerate(names[:2]):
-            bench.log_recording(
-                log,
-                name,
-                *bench_files.write(folder, f"run{k}", sensor, count=7, seed=k + 1),
-                remark=bench_files.HOSTILE,
-            )
+            files = bench_files.write(folder, f"run{k}", sensor, count=7, seed=k + 1)
+            bench.log_recording(log, name, *files, remark=bench_files.HOSTILE)
         log.add([notes.reading(name, "1.2k", "OL", remark=bench_files.HOSTILE) for name in names[:2]])
         log.add([notes.reading(name, "1.25k / 1.4k", "2.5M", remark=bench_files.FORMULA) for name in names[2:]])
     return folder / "log.db"

@@ -6,11 +6,10 @@ import math
 from dataclasses import replace
 
 import pytest
-from bench_files import written
 
 from sensorgen.analysis.comparison import of_iteration
 from sensorgen.analysis.comparison.expected import predicted
-from sensorgen.analysis.report import FORMATS, alternating, report
+from sensorgen.analysis.report import alternating, report
 from sensorgen.design.design import load
 from sensorgen.measure.log import Log, notes, prints
 from sensorgen.measure.log.prints import predicted_rows
@@ -81,10 +80,7 @@ def test_verdicts_go_by_frequency_and_flags_name_what_is_impossible(logged):
     found = {(row.specimen, row.frequency_hz): row for row in rows(made)}
     assert [found["leaky", f].verdict for f in (1e3, 1e4)] == ["leaking", "capacitor"]
     assert found["wrong", 3e6].flag == "negative resistance; outside the range of HP 4284A"
-    ohm, farad = (
-        2 * 0.042 * 0.1 / (0.3e-3 * 0.01),
-        8.8541878128e-12 * 4.68 * 0.1 * 0.01 / 0.4e-3,
-    )  # both electrodes, film
+    ohm, farad = 2 * 0.042 * 0.1 / (0.3e-3 * 0.01), 8.8541878128e-12 * 4.68 * 0.1 * 0.01 / 0.4e-3  # electrodes, film
     line = cmath.sqrt(2j * math.pi * 3e6 * ohm * farad)
     by_tanh = (line * cmath.tanh(line) / ohm).imag / (2 * math.pi * 3e6)
     assert found["wrong", 3e6].c_predicted_pf == pytest.approx(1e12 * by_tanh, rel=1e-3)
@@ -168,14 +164,6 @@ def test_bake_shrinkage_and_defects_stand_beside_their_change(tmp_path, design):
     assert changes == pytest.approx((0.75, 1, 0.62, 0.64))
     said = "baked, hole) against reading 1: electrode resistance x 0.75, film resistance x 1, C at 100kHz x 0.62"
     assert said in " ".join(made.findings)
-
-
-def test_one_reading_gets_a_short_page_in_every_format(logged):
-    made, _ = logged(S1=("", {"Cp": ["60pF@1kHz"]}))
-    assert len(written(made, "md").splitlines()) <= 60
-    assert made.title == "S1: predicted and measured"
-    assert len(made.headline) <= 5
-    assert all(written(made, how) for how in FORMATS)
 
 
 def test_words_for_a_verdict_that_changes_over_frequency():

@@ -8,6 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 from bench_files import ladder
+from line_cases import PLATE as LINE_PLATE
 
 from no_numbers import roughly_at_rest
 from sensorgen.analysis.comparison import of_iteration
@@ -162,24 +163,9 @@ TONES = np.array([1.1e3, 10.1e3, 99.7e3])
 def test_moved_parameters_are_those_of_the_line():
     """Straight from the line's formula, with the parameter itself changed."""
     other = moved(PLATE, 2.0, 1.5, 1e-6)
-    z = line.impedance(
-        line.PressedLine(
-            length_m=0.1,
-            width_m=0.01,
-            top_thickness_m=3e-4,
-            bottom_thickness_m=3e-4,
-            top_resistivity_ohm_m=10.0,
-            bottom_resistivity_ohm_m=10.0,
-            film_m=8.8541878128e-12 * 0.01 / (7.6e-10 * 1.5),
-            eps_r=1.0,
-            modulus_pa=6e5,
-            tip_m=0.01,
-            left_m=0.045,
-            force_n=0.0,
-            frequency_hz=TONES,
-            leak_s_per_m=1e-5,
-        )
-    )
+    changes = {"top_resistivity_ohm_m": 10.0, "bottom_resistivity_ohm_m": 10.0, "leak_s_per_m": 1e-5}
+    film = {"film_m": 8.8541878128e-12 * 0.01 / (7.6e-10 * 1.5), "eps_r": 1.0, "modulus_pa": 6e5}
+    z = line.impedance(line.PressedLine(**LINE_PLATE | changes | film | {"force_n": 0.0, "frequency_hz": TONES}))
     assert np.exp(at_rest(other, TONES)) == pytest.approx(z, rel=1e-9)
 
 

@@ -111,28 +111,17 @@ def test_differences_of_all_recordings_on_scales_of_their_own(recorded):
 
 
 def test_what_impedance_could_tell_is_the_cards_map():
-    of = SimpleNamespace(
-        required=SimpleNamespace(sigma_force_n=0.6, sigma_position_m=0.01),
-        map=SimpleNamespace(
-            force_n=[0.0, 1.0, 2.0, 3.0, 4.0], position_m=[0.0, 0.05],
-            sigma_force_n=[[k, 10.0 + k] for k in range(5)],
-            sigma_position_m=[[None, k / 1e3] for k in range(5)],
-        ),
-    )  # fmt: skip
-    above, under = errors(of)
+    force, position = [[k, 10.0 + k] for k in range(5)], [[None, k / 1e3] for k in range(5)]
+    known = {"sigma_force_n": force, "sigma_position_m": position, "position_m": [0.0, 0.05]}
+    needs = SimpleNamespace(sigma_force_n=0.6, sigma_position_m=0.01)
+    of = SimpleNamespace(force_n=[0.0, 1.0, 2.0, 3.0, 4.0], **known)
+    above, under = errors(SimpleNamespace(required=needs, map=of))
     (weak, middling, strong, needed), below = above.content, under.content
     assert [list(t.y) for t in (weak, middling, strong, needed)] == [[1, 11], [2, 12], [4, 14], [0.6, 0.6]]
     assert [t.name for t in (weak, middling, strong)] == ["1 N", "2 N", "4 N"]
     assert np.isnan([t.y[0] for t in below[:3]]).all()
     assert [t.y[1] for t in below] == pytest.approx([1.0, 2.0, 4.0, 10.0])
     assert list(weak.x) == [0.0, 50.0]
-
-
-def test_presses_of_a_run(recorded):
-    with Log(recorded) as log:
-        found = next(measured.runs(log, 30, []))
-    assert len(found.pairs.time_s) == 7
-    assert not any("no log of the rig" in note for note in found.notes)
 
 
 def run(*words):
@@ -178,18 +167,15 @@ def test_a_table_with_columns_of_its_own_is_not_left_out(tmp_path):
 
 
 def test_errors_of_position_stand_in_millimetres_and_unknown_ones_are_empty():
-    bench = SimpleNamespace(sigma_force_n=0.5, sigma_position_m=8e-3, correlation=None)
-    known = SimpleNamespace(
-        sigma_force_n=0.25, sigma_position_m=4e-3, correlation=-0.5, verdict="senses force", calibrated=bench
-    )
-    lost = SimpleNamespace(
-        sigma_force_n=0.25, sigma_position_m=None, correlation=None, verdict="no position", calibrated=None
-    )
+
+    def card(force_n, position_m, correlation, **more):
+        return SimpleNamespace(sigma_force_n=force_n, sigma_position_m=position_m, correlation=correlation, **more)
+
+    known = card(0.25, 4e-3, -0.5, verdict="senses force", calibrated=card(0.5, 8e-3, None))
+    lost = card(0.25, None, None, verdict="no position", calibrated=None)
     cards = {"a": known, "b": lost, "c": None}
-    predictions = {
-        name: SimpleNamespace(prediction=SimpleNamespace(identifiability=card, reason="a short"))
-        for name, card in cards.items()
-    }
+    of = {name: SimpleNamespace(identifiability=card, reason="a short") for name, card in cards.items()}
+    predictions = {name: SimpleNamespace(prediction=one) for name, one in of.items()}
     (table,) = identifiability(SimpleNamespace(predictions=predictions))
     assert table.columns[2].unit == "mm"
     assert list(table.cells) == [

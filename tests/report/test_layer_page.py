@@ -19,10 +19,8 @@ WAYS = "[...document.querySelectorAll('#plan .way')]"
 
 
 def turn_to(browser, layer):
-    browser.run(
-        "(() => { const s = document.getElementById('layer');"
-        f"s.value = {layer}; s.dispatchEvent(new Event('input')); }})()"
-    )
+    choose = f"s.value = {layer}; s.dispatchEvent(new Event('input'));"
+    browser.run(f"(() => {{ const s = document.getElementById('layer'); {choose} }})()")
 
 
 def test_a_path_is_the_region():

@@ -40,9 +40,8 @@ def covered(browser):
     """Pixels that are not ground, which is the colour of the corner."""
     browser.run(FRAME)
     seen = dict(map(tuple, browser.run(PIXELS)))
-    ground = int(
-        browser.run("getComputedStyle(document.documentElement).getPropertyValue('--band').trim().slice(1)"), 16
-    )
+    band = browser.run("getComputedStyle(document.documentElement).getPropertyValue('--band').trim().slice(1)")
+    ground = int(band, 16)
     return sum(count for colour, count in seen.items() if colour != ground), len(seen)
 
 

@@ -37,7 +37,5 @@ def test_the_headline_says_what_is_simulated():
     own, made = ROW, replace(ROW, recording="S1, recording 2, simulated")
     assert "measured 0 % of" in next(headline(table(own)))
     assert "simulated 0 % of" in next(headline(table(made)))
-    assert (
-        "measured 0 % of |Z| off the prediction (median of 2 frequencies in 2 recordings, 1 of them simulated)"
-        in next(headline(table(own, made)))
-    )
+    said = "measured 0 % of |Z| off the prediction (median of 2 frequencies in 2 recordings, 1 of them simulated)"
+    assert said in next(headline(table(own, made)))

@@ -71,7 +71,5 @@ def file_name(name):
 
 def text_of(**sections):
     """Sections of keys and values."""
-    return "\n".join(
-        f"[{name}]\n" + "".join(f"{key} = {value}\n" for key, value in values.items())
-        for name, values in sections.items()
-    )
+    lines = {name: "".join(f"{key} = {value}\n" for key, value in of.items()) for name, of in sections.items()}
+    return "\n".join(f"[{name}]\n{values}" for name, values in lines.items())

@@ -252,10 +252,8 @@ _REFUSED = (
     "M98 P\"0:/macros/mine.g\"", "T4 P0", "T1.5", "M1000", "M42", "M280 P0 S90", "M121", "G60 S0", "M501",
 )  # fmt: skip
 
-COMMANDS = tuple(
-    Fault(f"{command} amid the print", amid(command), "command macro read reach tool end home level")
-    for command in _REFUSED
-)
+_WHY = "command macro read reach tool end home level"
+COMMANDS = tuple(Fault(f"{command} amid the print", amid(command), _WHY) for command in _REFUSED)
 _MORE_THAN = "what 5 % of a filament's diameter makes too"
 
 GEOMETRY = (

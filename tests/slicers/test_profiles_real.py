@@ -63,11 +63,8 @@ def write_stl(path: Path, corners: Corners) -> Path:
 def write_3mf(path: Path, bodies: list[tuple[Corners, int, dict[str, str]]]) -> Path:
     """One object with one mesh; triangle ranges say which extruder (from 1) prints what, and how."""
     vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for b, _, _ in bodies for x, y, z in b)
-    triangles = "".join(
-        f'<triangle v1="{8 * n + a}" v2="{8 * n + b}" v3="{8 * n + c}"/>'
-        for n in range(len(bodies))
-        for a, b, c in TRIANGLES
-    )
+    corners = ([8 * n + corner for corner in t] for n in range(len(bodies)) for t in TRIANGLES)
+    triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in corners)
     volumes = ""
     for n, (_, extruder, settings) in enumerate(bodies):
         own = {"name": f"body {n}", "extruder": str(extruder)} | settings
@@ -96,10 +93,8 @@ def write_3mf(path: Path, bodies: list[tuple[Corners, int, dict[str, str]]]) -> 
 
 
 def usual(printer: Printer, **dielectric: object) -> dict[int, ToolLoad]:
-    return {
-        printer.default_tools["etpu"]: ToolLoad(materials.load("etpu")),
-        printer.default_tools["x60"]: ToolLoad(materials.load("x60"), **dielectric),
-    }
+    tools, etpu, x60 = printer.default_tools, materials.load("etpu"), materials.load("x60")
+    return {tools["etpu"]: ToolLoad(etpu), tools["x60"]: ToolLoad(x60, **dielectric)}
 
 
 def read(path: Path, printer: Printer) -> extruded.Extruded:
@@ -171,11 +166,7 @@ def test_prusa_prints_each_box_with_its_tool(prusa_slicer, printer, quality, tmp
     loads = usual(printer)
     low, high = (printer.slicer_index(printer.default_tools[name]) for name in ("etpu", "x60"))
     centre = printer.bed_centre_mm()
-    bodies = [
-        (box(0, STEP_MM, centre), low + 1, {}),
-        (box(STEP_MM, 2 * STEP_MM, centre), high + 1, {}),
-        (box(2 * STEP_MM, 3 * STEP_MM, centre), low + 1, {}),
-    ]
+    bodies = [(box(k * STEP_MM, (k + 1) * STEP_MM, centre), at + 1, {}) for k, at in enumerate((low, high, low))]
     result = slice_with_prusa(printer, quality, loads, bodies, tmp_path)
     found = read(result, printer)
     assert found.tools == (low, high, low)
@@ -253,11 +244,7 @@ def slice_with_cura(printer, quality, loads, bodies, folder):
 @both_qualities
 def test_cura_prints_each_box_with_its_tool(cura_engine, printer, quality, tmp_path):
     low, high = (printer.slicer_index(printer.default_tools[name]) for name in ("etpu", "x60"))
-    bodies = [
-        (box(0, STEP_MM), low),
-        (box(STEP_MM, 2 * STEP_MM), high),
-        (box(2 * STEP_MM, 3 * STEP_MM), low),
-    ]
+    bodies = [(box(k * STEP_MM, (k + 1) * STEP_MM), tool) for k, tool in enumerate((low, high, low))]
     result = slice_with_cura(printer, quality, usual(printer), bodies, tmp_path)
     found = read(result, printer)
     # The tower's outline is always printed by the first tool, so the tools alternate where one would do.

@@ -65,13 +65,8 @@ def test_prusaslicer_prints_every_body_on_its_tool(
     folder = build(variant, tmp_path, cad=False).folder
     out = tmp_path / "print.gcode"
     prusa.slice_3mf(folder / f"{variant.name}.prusa.3mf", folder / "profiles/prusa/diabase-h5-fine.ini", out)
-    judge(
-        record_property,
-        "Prusa",
-        name,
-        variant,
-        extruded.read(out.read_text().splitlines(), variant.machine.filament_mm),
-    )
+    lines = extruded.read(out.read_text().splitlines(), variant.machine.filament_mm)
+    judge(record_property, "Prusa", name, variant, lines)
 
 
 @variants

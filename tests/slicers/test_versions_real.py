@@ -111,12 +111,8 @@ def test_two_sensors_stand_where_they_were_placed(slicer, newer_program, tmp_pat
 
 def test_options_of_the_design_reach_the_print(newer_program, tmp_path):
     infill = {"x60": {"percent": 40.0, "pattern": "gyroid"}}
-    profile = {
-        "walls": "classic",
-        "wall_lines": {"x60": 1},
-        "line_mm": {"x60": 0.5},
-        "settings": {"prusa": {"nonsense": 1}},
-    }
+    own = {"settings": {"prusa": {"nonsense": 1}}}
+    profile = {"walls": "classic", "wall_lines": {"x60": 1}, "line_mm": {"x60": 0.5}} | own
     variant = small("23/trix-d0.2.yaml", infill=infill, profile=profile)
     made = sliced([alone(variant)], "prusa", tmp_path, program=newer_program("prusa-slicer"))
     assert check(made.ready, variant.machine).errors(strict=True) == []

@@ -160,10 +160,8 @@ def test_curas_window_opens_the_sensor_on_our_printer(program, screen, monkeypat
     monkeypatch.setattr(windows, "PATIENCE_S", 240.0)
     loads = slicing.plate_loads([slicing.alone(SENSOR)])
     used = recipes(machine, layers, loads)
-    write(
-        tmp_path, cura.profiles(machine, layers, loads), machine, layers.name,
-        {k: cura.material_id(r) for k, r in used.items()},
-    )  # fmt: skip
+    ids = {k: cura.material_id(r) for k, r in used.items()}
+    write(tmp_path, cura.profiles(machine, layers, loads), machine, layers.name, ids)
     (tmp_path / "sensor.3mf").write_bytes(slicing.plate_3mf([slicing.alone(SENSOR)], "cura", "sensor"))
     own = {"HOME": str(tmp_path), "DISPLAY": screen.display, "LIBGL_ALWAYS_SOFTWARE": "1"}
     log = tmp_path / "log"

@@ -10,13 +10,7 @@ import pytest
 
 from sensorgen.core.bounds import Interval
 from sensorgen.design import design as designs
-from sensorgen.models import (
-    columns,
-    compression,
-    fem2d,
-    line,
-    thesis_cells,
-)
+from sensorgen.models import columns, compression, fem2d, line, thesis_cells
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction.bodies import drawn

@@ -153,11 +153,8 @@ def test_json_holds_every_value(rows):
     by = {(d["kind"], d["number"]): d for d in data}
     z = by["equation", "B.53"]["parts"][0]
     assert z["printed"] == pytest.approx(z["ours"])
-    nowhere = [
-        ReproducedItem(
-            "2", "equation", rows[0].item, (ItemPart("x", "m", [1.0, 2.0], [1.0, float("nan")]),), rows[0].verdict
-        )
-    ]
+    part = ItemPart("x", "m", [1.0, 2.0], [1.0, float("nan")])
+    nowhere = [ReproducedItem("2", "equation", rows[0].item, (part,), rows[0].verdict)]
     assert thesis.plain(nowhere)[0]["parts"][0]["printed"] == [1.0, None]
     pair = by["equation", "2.20"]["parts"][0]
     assert pair["printed"][1] == 0

@@ -32,17 +32,6 @@ def test_lead_stray_gain_and_leak_are_where_they_are_on_a_bench():
     assert truth.impedance(0.0, 0.05)[0] == pytest.approx((50 + inside) * np.exp(0.01 + 0.02j), rel=1e-6)
 
 
-def test_it_remembers():
-    truth = Truth(hysteresis=0.05, creep=0.02)
-    force = np.array([2.0])
-
-    def rise(peak, hold):
-        return truth.rise(force / (WIDTH_M * truth.tip_m), force, np.array([peak]), np.array([hold]))[0]
-
-    assert rise(4.0, 1.0) / rise(2.0, 1.0) == pytest.approx(1.025)
-    assert rise(2.0, 10.0) / rise(2.0, 1.0) == pytest.approx(1.02)
-
-
 def test_a_session_is_reproducible_and_noise_is_what_it_says():
     truth = Truth(noise=2e-3)
     one, again = (session(truth, 400, 3) for _ in range(2))

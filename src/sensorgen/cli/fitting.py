@@ -270,8 +270,7 @@ def report_command(
     """
     from sensorgen.analysis.report import FORMATS, STEPS, pieces, report
 
-    end = Path(output).suffix.lstrip(".")
-    how = how or (end if end in FORMATS else "html")
+    how = how or next((end for end in FORMATS if output.endswith(f".{end}")), "html")
     if show_it and (how != "html" or output == "-"):
         raise BadInput("--open shows an HTML file; expected --format html and a file")
     if specimens and iteration is not None:

@@ -368,6 +368,12 @@ def _intact_ohm(of: Predicted | None, instrument: str) -> float:
     return intact_ohm(c.value if c else 0.0, TONES_HZ[0], highest)
 
 
+def _missing(row: Compared) -> list[str]:
+    """Resistances that a reading lacks for a verdict; none where another reading of the specimen has them."""
+    values = (("R_Y", row.reading.y_ohm), ("R_Z", row.reading.z_ohm))
+    return [of for of, ohm in values if not ohm] if row.verdict.word == "unknown" else []
+
+
 def _unused(rows: Iterable[Compared], alternating: Container[int]) -> Iterator[tuple[str, str]]:
     for row in rows:
         name = f"reading {row.reading.number}, {row.reading.specimen}"
@@ -375,10 +381,10 @@ def _unused(rows: Iterable[Compared], alternating: Container[int]) -> Iterator[t
             yield name, "no design is known: nothing to compare it with"
         if row.reading.number in alternating:
             continue
-        missing = [of for of, ohm in (("R_Y", row.reading.y_ohm), ("R_Z", row.reading.z_ohm)) if not ohm]
+        missing = _missing(row)
         if len(missing) == 2:
             yield name, "no measurement in it"
-        elif missing and row.verdict.word == "unknown":
+        elif missing:
             yield name, f"no {missing[0]}: counts for nothing where both are needed"
         if any(value < 0 for value in (*row.reading.y_ohm, *row.reading.z_ohm)):
             yield name, "a resistance below 0 is no reading"

@@ -37,7 +37,7 @@ from sensorgen.prediction.capacitance_answer import CellCapacitance
 from sensorgen.prediction.compression import CompressionResult
 from sensorgen.prediction.identifiability.fisher import LeastErrors, Setup, bounds, required, slopes
 from sensorgen.prediction.identifiability.identify import surface
-from sensorgen.prediction.inverse.verdict import Presses
+from sensorgen.prediction.inverse.verdict import PressAnswers
 from sensorgen.prediction.query import FORCE_N, NOISE
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.sweep import Sweep
@@ -202,7 +202,7 @@ def fitted(fit: "Fit") -> Figure:
 _MOST_NAMES = 40  # readings that are numbered each
 
 
-def presses(of: Presses) -> Figure:
+def presses(of: PressAnswers) -> Figure:
     """Force and position behind readings, with their 90 % intervals."""
     number: Values = np.arange(1.0, len(of.force_n) + 1)
     names = tuple(map(str, range(1, len(of.force_n) + 1))) if len(of.force_n) <= _MOST_NAMES else ()

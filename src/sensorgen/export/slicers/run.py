@@ -12,15 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.core.leash import NOT_RUN, on_leash
 from sensorgen.export.slicers import TIME_LIMIT_S
 
-if TYPE_CHECKING:
-    from sensorgen.scene.geometry.meshes import Mesh  # with Shapely, which running a slicer does without
+if TYPE_CHECKING:  # with NumPy and Shapely, which running a slicer does without
+    from sensorgen.core.arrays import Real
+    from sensorgen.scene.geometry.meshes import Mesh
 
 KEPT_LINES = 12
 _TICK_S = 0.1
@@ -139,10 +137,10 @@ def _last_words(output: BinaryIO) -> str:
     return " | ".join((errors or shown)[-KEPT_LINES:]) or "it said nothing"
 
 
-_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+_FACET = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]
 
 
-def content(mesh: "Mesh", shift_mm: NDArray[np.float64]) -> bytes:
+def content(mesh: "Mesh", shift_mm: "Real") -> bytes:
     """The file of a mesh.
 
     Parameters
@@ -152,6 +150,8 @@ def content(mesh: "Mesh", shift_mm: NDArray[np.float64]) -> bytes:
     shift_mm : (3,) float64 array
         Added to every corner [mm].
     """
+    import numpy as np
+
     facets = np.zeros(len(mesh.triangles), dtype=_FACET)
     facets["corners"] = (mesh.vertices_mm + shift_mm)[mesh.triangles]
     return bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()

@@ -20,7 +20,7 @@ from sensorgen.prediction.calibration.specimen import Bench, SpecimenModel, spre
 from sensorgen.prediction.inference import NORMAL_90, Index, cramer_rao, parts, whitening
 from sensorgen.prediction.inverse.estimator import Prior
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
-from sensorgen.prediction.inverse.verdict import Presses, Worded, chi2_limit
+from sensorgen.prediction.inverse.verdict import PressAnswers, Worded, chi2_limit
 from sensorgen.prediction.sensor_model import SensorModel
 
 LEVEL = 0.9  # probability of the intervals
@@ -75,7 +75,7 @@ class Verdict(Worded):
 
 
 @dataclass(frozen=True, eq=False)
-class InvertedPresses(Presses):
+class InvertedPresses(PressAnswers):
     """Presses behind readings.
 
     Attributes

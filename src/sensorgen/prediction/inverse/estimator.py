@@ -15,7 +15,7 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.inference import NORMAL_90, Index, LeastSquares, LocalFit, Samples, descend, parts
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Local, ResponseTable, bearable_n, log_impedance, tones
-from sensorgen.prediction.inverse.verdict import PAIR, Presses, Status, covariance, statuses
+from sensorgen.prediction.inverse.verdict import PAIR, PressAnswers, Status, covariance, statuses
 
 LOOSE, TIGHT = 0.2, 0.01  # share of the residual that a step still removes when a sample is done (Bates and Watts 1981)
 REACH = 0.1  # farthest that one step moves the position: beyond it the response is not linear
@@ -206,7 +206,7 @@ _RIVAL = 2 * PAIR**0.5  # distance of two presses up to which noise may exchange
 
 
 @dataclass(frozen=True)
-class Estimates(Presses):
+class Estimates(PressAnswers):
     """Estimated presses, sample by sample.
 
     Attributes

@@ -109,7 +109,7 @@ class PressRow:
     status: Annotated[str, Column("status")]
 
 
-class Presses(Samples, Displayed):
+class PressAnswers(Samples, Displayed):
     """Presses behind readings: force and position with the ends of their intervals, and a status."""
 
     if TYPE_CHECKING:

@@ -7,6 +7,7 @@ stays.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import combinations_with_replacement, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ _Short = NDArray[np.float32]
 _PIVOT = 1e-3  # share of its column below which a pivot of an indefinite matrix is exchanged [-]
 _LEAST = 100  # unknowns that are not halved any more
 _MOST_TURNS = 30  # of conjugate gradients, before new factors are made
+_FEW_TURNS = 10  # from which on they have to be as fast as the most turns need
 _ENOUGH = 1e-4  # residual over right side: Newton's method takes the rest away [-]
 
 
@@ -121,11 +123,13 @@ def order_of(matrix: csr_matrix, places: Whole) -> Order:
     ends = np.cumsum([len(own) for own, _ in pieces])
     turned = matrix[turn][:, turn]
     fronts: list[FrontalMatrix] = []
+    coupled = np.zeros(len(turn), bool)
     for (own, children), stop in zip(pieces, ends.tolist(), strict=True):
         start = stop - len(own)
         near = [turned.indices[turned.indptr[start] : turned.indptr[stop]], *(fronts[c].outer for c in children)]
-        outer = np.unique(np.concatenate(near))
-        fronts.append(FrontalMatrix(start, stop, outer[outer >= stop].astype(np.int64), children))
+        coupled[np.concatenate(near)] = True
+        fronts.append(FrontalMatrix(start, stop, stop + np.flatnonzero(coupled[stop:]), children))
+        coupled[:] = False
     return Order(turn, fronts)
 
 
@@ -202,12 +206,15 @@ def _factored(turned: csr_matrix, order: Order, kind: type[np.floating]) -> Fact
         later = columns >= front.start
         whole[rows[later], front.local(columns[later])] = turned.data[low:high][later]
         for child in front.children:
-            at = front.local(order.fronts[child].outer)
-            whole.ravel()[len(whole) * at[:, None] + at] += rests.pop(child)  # sooner than by rows and columns
-        lower, failed = cholesky(whole[:n, :n], lower=True, clean=True)
+            at, rest = front.local(order.fronts[child].outer), rests.pop(child)
+            ends = np.flatnonzero(np.diff(at, prepend=-2, append=-2) != 1).tolist()
+            runs = [(slice(a, b), slice(place := int(at[a]), place + b - a)) for a, b in pairwise(ends)]
+            for (i, here), (j, there) in combinations_with_replacement(runs, 2):  # the upper triangle: no other is used
+                whole[here, there] += rest[i, j]
+        upper, failed = cholesky(whole[:n, :n], clean=True)
         if failed:
             return None
-        inverse = np.ascontiguousarray(inverted(lower, lower=True)[0]) if n else lower
+        inverse = inverted(upper)[0].T if n else upper
         coupling = inverse @ whole[:n, n:]
         parts.append((inverse.astype(np.float32), coupling.astype(np.float32)))
         rests[number] = whole[n:, n:] - coupling.T @ coupling
@@ -229,21 +236,27 @@ class Solver:
     places: Whole
     enough: float = _ENOUGH
     _factors: Factors | None = field(default=None, repr=False)
+    _last: tuple[Whole, Order] | None = field(default=None, repr=False)  # indices of a pattern, and its order
 
     def __call__(self, matrix: csr_matrix, right: Real) -> Real | None:
         """Solution of a positive system, or None where it is not."""
         solution = self._iterated(matrix, right)
         if solution is None:
-            self._factors = factored(matrix, order_of(matrix, self.places))
+            if not (self._last and np.may_share_memory(self._last[0], matrix.indices)):
+                self._last = matrix.indices, order_of(matrix, self.places)
+            self._factors = factored(matrix, self._last[1])
             solution = self._iterated(matrix, right)
         return solution
 
     def _iterated(self, matrix: csr_matrix, right: Real) -> Real | None:
         if self._factors is None:
             return None
-        for solution, residual, _ in iterations(matrix, right, self._factors):
-            if np.abs(residual).max() < self.enough * np.abs(right).max():
+        for turn, (solution, residual, _) in enumerate(iterations(matrix, right, self._factors), 1):
+            left = np.abs(residual).max() / np.abs(right).max()
+            if left < self.enough:
                 return solution
+            if turn >= _FEW_TURNS and left > self.enough ** (turn / _MOST_TURNS):
+                break
         return None
 
 

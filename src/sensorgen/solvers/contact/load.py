@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix, diags
+from scipy.sparse import coo_matrix, csr_matrix, vstack
 from scipy.sparse.csgraph import connected_components
 
 from sensorgen.core.arrays import Mask, Real, Whole
@@ -18,6 +18,7 @@ _LEAST = 1e-7  # of the penalty: pressures below it are lost in the rounding of 
 _NEARLY = 1e-3  # residual over load before the contact partners are updated
 _STILL = 1e-10  # a step so much shorter than the displacement is rounding: nu near 1/2 turns it into forces
 _MOST_STEPS = 15
+_MOST_SETS = 3  # of gaps that close, tried for one step
 _SLOW = 0.2  # an earlier stiffness serves as long as each step with it leaves less than this share of the residual [-]
 _LEAST_J = 0.05  # a step may not compress an element below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of Newton's step
@@ -42,10 +43,50 @@ class State:
 
 @dataclass(frozen=True)
 class Stiffness:
-    """Derivative of the forces at a state: of each element, and of all with the contact on the free displacements."""
+    """Derivative of the elements' forces at a state: of each, and of all on the free displacements."""
 
     elements: Tangent
     whole: csr_matrix
+
+
+@dataclass
+class Springs:
+    """Contact of frozen pairs as springs: gaps act where they are closed, slips where faces stick.
+
+    Attributes
+    ----------
+    rows : sparse (k, d n)
+        Lengths from the places of all nodes, times the root of the stiffness.
+    slid : (k,) array
+        Lengths without force, times this root.
+    always : (k,) array
+        Which act whatever their length.
+    across, push : sparse (k, n), (n, k)
+        Lengths from the free displacements, and the transpose.
+    """
+
+    rows: csr_matrix
+    slid: Real
+    always: Mask
+    across: csr_matrix
+    push: csr_matrix
+    _last: tuple[csr_matrix, Mask, csr_matrix] | None = field(default=None, repr=False)
+
+    def lengths(self, places: Real) -> tuple[Real, Mask]:
+        """Lengths at places of the nodes (n, d), times the root of the stiffness, and which springs act."""
+        length = self.rows @ places.ravel() - self.slid
+        return length, self.acting(length)
+
+    def acting(self, length: Real) -> Mask:
+        """Springs that act at some lengths."""
+        return (length < 0) | self.always
+
+    def added(self, whole: csr_matrix, acts: Mask) -> csr_matrix:
+        """A stiffness with that of some springs; the very one before where both are the same, for its factors."""
+        if not (self._last and self._last[0] is whole and np.array_equal(self._last[1], acts)):
+            part = self.across[acts]
+            self._last = whole, acts, whole + part.T @ part if acts.any() else whole
+        return self._last[2]
 
 
 @dataclass(frozen=True)
@@ -87,6 +128,7 @@ class Problem:
     settled: float = 0.05
     updates: int = 4
     _last: list["Stiffness"] = field(default_factory=list, repr=False, compare=False)
+    _springs: list[tuple[FacePairs, Springs]] = field(default_factory=list, repr=False, compare=False)
 
     @property
     def dimension(self) -> int:
@@ -154,59 +196,70 @@ class Problem:
         return np.column_stack([slip @ places for slip in pairs.slips]) - pairs.slid_m
 
     @cached_property
-    def pattern(self) -> tuple[csr_matrix, Whole, Whole]:
-        """The elements' stiffness on the free displacements, empty; which of their entries it has, and where."""
-        number = np.full(self.free.shape[0], -1, np.int32)
+    def pattern(self) -> tuple[csr_matrix, Whole]:
+        """The elements' stiffness on the free displacements, empty; place of each of their entries in it, from 1 on.
+
+        Entries of fixed displacements have no place: 0.
+        """
+        n = self.free.shape[1]
+        number = np.full(self.free.shape[0], n, np.int32)
         number[np.diff(self.free.indptr) > 0] = self.free.indices
         here = number[self.elements.freedoms]
-        size, n = here.shape[1], self.free.shape[1]
-        rows, columns = np.repeat(here, size, axis=1).ravel(), np.tile(here, (1, size)).ravel()
-        inside = np.flatnonzero((rows >= 0) & (columns >= 0))
-        at = rows[inside], columns[inside]
-        empty = coo_matrix((np.zeros(len(inside)), at), (n, n)).tocsr()
-        # Sooner than sorting all entries: each is looked up by its number from 1 on
-        numbered = csr_matrix((np.arange(1, empty.nnz + 1), empty.indices, empty.indptr), empty.shape)
-        return empty, inside, np.asarray(numbered[at]).ravel() - 1
+        size, moves = here.shape[1], here < n
+        starts = np.append(0, np.cumsum(moves.sum(axis=1)))
+        shared = csr_matrix((np.ones(starts[-1], np.int32), here[moves], starts), (len(here), n))
+        pattern = (shared.T @ shared).tocsr()
+        pattern.sort_indices()
+        # Sooner than sorting all entries: each is looked up by its number; fixed ones are in an empty row or column
+        starts = np.append(pattern.indptr, pattern.nnz)
+        numbered = csr_matrix((np.arange(1, pattern.nnz + 1), pattern.indices, starts), (n + 1, n + 1))
+        at = np.repeat(here, size, axis=1).ravel(), np.tile(here, (1, size)).ravel()
+        return pattern, np.asarray(numbered[at]).ravel()
 
-    def _springs(self, pairs: FacePairs, u: Real) -> Iterator[tuple[csr_matrix, Mask, Real]]:
-        """Rows of what the contact acts on, gaps and slips, on which of them it does, and how far each is moved [m]."""
-        gap = self.gaps(pairs, u)
-        yield pairs.gap, gap < 0, gap
+    @cached_property
+    def _freed(self) -> csr_matrix:
+        """Forces on the free displacements from those on all."""
+        return self.free.T.tocsr()
+
+    def springs(self, pairs: FacePairs) -> Springs:
+        """Contact pairs as springs; those of the last pairs are kept."""
+        if not (self._springs and self._springs[0][0] is pairs):
+            self._springs[:] = [(pairs, self._sprung(pairs))]
+        return self._springs[0][1]
+
+    def _sprung(self, pairs: FacePairs) -> Springs:
+        rows, root, slid = pairs.gap, np.sqrt(pairs.stiffness_pa), np.zeros(len(pairs.point))
+        always = np.zeros(len(slid), bool)
         if self.stick:
-            for slip, way in zip(pairs.slips, self.slips(pairs, u).T, strict=True):
-                yield slip, pairs.sticks, way
-
-    def contact_force(self, pairs: FacePairs, u: Real) -> Real:
-        """Forces of the contact on all displacements (d n,) [N], per depth in two dimensions [N/m]."""
-        force = np.zeros(len(u))
-        for rows, acts, length in self._springs(pairs, u):
-            force += rows.T @ (pairs.stiffness_pa * acts * length)
-        return force
+            stuck = pairs.some(pairs.sticks)
+            rows = vstack([rows, *stuck.slips]).tocsr()
+            root = np.concatenate([root, np.tile(np.sqrt(stuck.stiffness_pa), len(stuck.slips))])
+            slid = np.concatenate([slid, stuck.slid_m.T.ravel()])
+            always = np.arange(len(slid)) >= len(pairs.point)
+        weighted = csr_matrix(
+            (rows.data * np.repeat(root, np.diff(rows.indptr)), rows.indices, rows.indptr), rows.shape
+        )
+        across = weighted @ self.free
+        return Springs(weighted, slid * root, always, across, across.T.tocsr())
 
     def contact_energy(self, state: State) -> float:
         """Energy in the penalty [J], per depth in two dimensions [J/m]."""
-        gap = np.minimum(self.gaps(state.pairs, state.u_m), 0.0)
-        slip = (self.slips(state.pairs, state.u_m) ** 2).sum(axis=1) * state.pairs.sticks
-        return float(0.5 * (state.pairs.stiffness_pa * (gap**2 + slip)).sum())
+        length, acts = self.springs(state.pairs).lengths(self.places(state.u_m))
+        return float(0.5 * (length[acts] ** 2).sum())
 
     def _linearised(self, state: State) -> Stiffness:
-        """Derivative of the forces at a state."""
-        tangent, (empty, inside, place) = self.elements.tangent(state.u_m, state.inner), self.pattern
-        data = np.bincount(place, tangent.stiffness.ravel()[inside], empty.nnz)
-        whole = csr_matrix((data, empty.indices, empty.indptr), empty.shape)
-        for rows, acts, _ in self._springs(state.pairs, state.u_m):
-            if acts.any():
-                across = rows[acts] @ self.free
-                whole = whole + across.T @ diags(state.pairs.stiffness_pa[acts]) @ across
-        return Stiffness(tangent, whole)
+        """Derivative of the elements' forces at a state."""
+        tangent, (pattern, place) = self.elements.tangent(state.u_m, state.inner), self.pattern
+        data = np.bincount(place, tangent.stiffness.ravel(), pattern.nnz + 1)[1:]
+        return Stiffness(tangent, csr_matrix((data, pattern.indices, pattern.indptr), pattern.shape))
 
     def _residual(self, state: State, tangent: Tangent) -> tuple[Real, Unbalanced]:
         """Unbalanced forces on the free displacements, and what the elements leave."""
-        residual = self.elements.residual(state.u_m, state.inner)
+        residual, springs = self.elements.residual(state.u_m, state.inner), self.springs(state.pairs)
         own = tangent.condensed(residual, self.elements.law.mu_pa)
         inside = np.bincount(self.elements.freedoms.ravel(), own.force.ravel(), len(self.load)).astype(float)
-        force = inside + self.contact_force(state.pairs, state.u_m) - state.pressure_pa * self.load
-        return self.free.T @ force, own
+        length, acts = springs.lengths(self.places(state.u_m))
+        return self._freed @ (inside - state.pressure_pa * self.load) + springs.push @ (acts * length), own
 
     def newton(self, state: State, pressure_pa: float, pairs: FacePairs, enough: float) -> State | None:
         """Equilibrium at a pressure with frozen contact pairs, or None where Newton's method does not converge.
@@ -252,7 +305,7 @@ class Problem:
 
     def _moved(self, state: State, by: Stiffness, rest: Real, unbalanced: Unbalanced) -> State | None:
         """State after a step of Newton's method, or so much of it that no element is squeezed too far; None if none."""
-        step = self.solver(by.whole, -rest) if np.isfinite(rest).all() else None
+        step = self._step(state, by, rest) if np.isfinite(rest).all() else None
         if step is None:
             return None
         du = self.free @ step
@@ -262,6 +315,24 @@ class Problem:
             if self.elements.volume_ratio(u, inner).min() > _LEAST_J:
                 return replace(state, u_m=u, inner=inner)
         return None
+
+    def _step(self, state: State, by: Stiffness, rest: Real) -> Real | None:
+        """Step of the free displacements to balance, where gaps close and open within it; None where singular.
+
+        Which ones does is tried on the linear problem: by those that are closed before, the first steps at a new load
+        leave a hundred times the forces.
+        """
+        springs = self.springs(state.pairs)
+        length, before = springs.lengths(self.places(state.u_m))
+        acts, step = before, None
+        for _ in range(_MOST_SETS):
+            more = springs.push @ ((acts * 1.0 - before) * length)
+            step = self.solver(springs.added(by.whole, acts), -rest - more)
+            after = acts if step is None else springs.acting(length + springs.across @ step)
+            if np.array_equal(after, acts):
+                break
+            acts = after
+        return step
 
     def touches(self, state: State, share: float = 0.0) -> bool:
         """Test whether faces touch, or are nearer than a share of their sides."""
