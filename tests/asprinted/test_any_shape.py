@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from sensorgen.asprinted import printed as window
-from sensorgen.asprinted.beads import Beads, _narrowed, layers
+from sensorgen.asprinted.beads import Beads, _cut, _narrowed, layers
 from sensorgen.asprinted.printed import gap_mm
 from sensorgen.checks import estimate
 from sensorgen.design import shape_files
@@ -134,6 +134,15 @@ def straight(start, end, width=0.4):
     volume = np.hypot(*(end - start).T) * width * 0.1
     layer, body, tool = (np.full(len(start), k) for k in (6, 2, 1))
     return Beads(start, end, ones * width, ones * 0.1, volume, layer, body, tool, np.arange(len(start)))
+
+
+@pytest.mark.parametrize(("slit", "strips"), [(0.021, 1), (0.022, 2)])
+def test_strips_beside_each_other_are_one_as_far_as_round_beads_bulge(slit, strips):
+    """By 0.0215 mm in a layer of 0.1 mm."""
+    lines = straight([[1.0, 0.0], [1.4 + slit, 0.0]], [[1.0, 8.0], [1.4 + slit, 8.0]])
+    runs = _cut(lines, 0, 4.0, "vol", estimate.ROUND * 0.1)
+    assert len(runs) == strips
+    assert runs[[0, -1], [0, 1]] == pytest.approx([0.8, 1.6 + slit])
 
 
 @pytest.mark.parametrize("convention", ["vol", "deposit"])

@@ -27,7 +27,7 @@ def capacitance_f(body):
 
 
 def estimated_gap(variant, walls):
-    return body(variant, walls=walls).gap_mm[0]
+    return gap_mm(body(variant, walls=walls).cell.scene)
 
 
 @pytest.mark.parametrize(

@@ -206,6 +206,16 @@ def test_edges_that_rounding_parted_become_one(below, above, cut):
     assert [edges(layer) for layer in found] == [pytest.approx(of, abs=1e-12) for of in cut]
 
 
+def test_steps_that_overlap_by_less_than_any_printer_places_touch():
+    """Else a weld of 3 um carries the load, and no mesh of it is fine enough."""
+    plan = window.Window((0.0, 2.0), (0.0, 1.0))
+    for overlap, touch in ((0.003, True), (0.006, False)):
+        given = [strips(0.0, 0.1, (0.3, 0.8), (1.2, 1.7)), strips(0.1, 0.2, (0.8 - overlap, 1.2 + overlap))]
+        lower, upper = window.joined(given, plan)
+        places = shapely.bounds(shapely.get_parts(lower.region("a")))[:, [0, 2]].ravel()
+        assert set(edges(upper)) <= set(places) if touch else set(edges(upper)).isdisjoint(places)
+
+
 def test_a_cell_that_rounding_made_lopsided_is_its_own_mirror_image():
     given = [strips(0.0, 0.1, (0.25, 0.450363), (1.549638, 1.75)), strips(0.1, 0.2, (0.3, 1.7))]
     plan = window.Window((0.0, 2.0), (0.0, 1.0))

@@ -19,6 +19,7 @@ from sensorgen.design.design import Design
 from sensorgen.export.gcode.motion import Paths, follow, paths_of
 from sensorgen.export.gcode.moves import Motion
 from sensorgen.export.gcode.reading import Source
+from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, parts
 from sensorgen.scene.scene import SLIVER_MM, Point
 
@@ -182,9 +183,9 @@ def layers(
     Notes
     -----
     A layer that is drawn as strips is cut across near the middle of the sensor, and the median cut is taken along the
-    whole strip. Of any other layer the union of all lines is taken, with slits between touching lines closed; the
-    outline of each separate part is moved until its area is what its lines deposit: round ends of short lines would
-    double a small tip. There "vol" and "deposit" are one.
+    whole strip. Of any other layer the union of all lines is taken; the outline of each separate part is moved until
+    its area is what its lines deposit: round ends of short lines would double a small tip. There "vol" and "deposit"
+    are one. Slits are closed that are no wider than a line of the file's width is over one of its volume.
     """
     if convention not in CONVENTIONS:
         raise UnknownName("convention for a line's width", convention, CONVENTIONS)
@@ -216,21 +217,21 @@ def _rest(region: Region, others: tuple[Region, ...]) -> Region:
 
 def _strips(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convention: str) -> Region:
     """The median of some cuts near the middle, along the whole sensor."""
-    axis = "yx".index(layer.along)
+    axis, slit = "yx".index(layer.along), ROUND * layer.height_mm
     long, end = size_mm[1 - axis], size_mm[axis]
-    cuts = [_cut(lines, axis, long / 2 + share * long / 10, convention).clip(0.0, end) for share in _CUTS]
+    cuts = [_cut(lines, axis, long / 2 + share * long / 10, convention, slit).clip(0.0, end) for share in _CUTS]
     low, high = sorted(cuts, key=lambda cut: float(np.diff(cut).sum()))[len(cuts) // 2].T
     return shapely.multipolygons(shapely.box(low, 0.0, high, long) if axis == 0 else shapely.box(0.0, low, long, high))
 
 
-def _cut(lines: Beads, axis: int, at_mm: float, convention: str) -> Real:
-    """Runs along an axis, (n, 2), in which a line square to it meets the beads [mm]."""
-    runs = _merged(_runs(lines.corners_mm(convention), axis, at_mm))
+def _cut(lines: Beads, axis: int, at_mm: float, convention: str, slit_mm: float) -> Real:
+    """Runs along an axis, (n, 2), in which a line square to it meets the beads, without slits up to a width [mm]."""
+    runs = _merged(_runs(lines.corners_mm(convention), axis, at_mm), slit_mm)
     if convention == "deposit" and len(runs):
         met = _runs(lines.corners_mm(convention, 0.0), axis, at_mm)  # ends that reach over the next line count once
         owner = (np.searchsorted(runs[:, 0], met.mean(1)) - 1).clip(0)
         taken = np.bincount(owner, np.diff(met)[:, 0], len(runs))
-        runs = _merged(runs + (taken - np.diff(runs)[:, 0]).clip(0.0)[:, None] / 2 * [-1, 1])
+        runs = _merged(runs + (taken - np.diff(runs)[:, 0]).clip(0.0)[:, None] / 2 * [-1, 1], slit_mm)
     return runs
 
 
@@ -245,13 +246,13 @@ def _runs(corners_mm: Real, axis: int, at_mm: float) -> Real:
     return np.asarray(runs[hit])
 
 
-def _merged(runs: Real) -> Real:
-    """Union of runs, (n, 2) [mm]."""
+def _merged(runs: Real, slit_mm: float) -> Real:
+    """Union of runs, (n, 2), and of the slits between them up to a width [mm]."""
     runs = runs[runs[:, 0].argsort()]
     if not len(runs):
         return runs
     reach = np.maximum.accumulate(runs[:, 1])
-    starts = np.flatnonzero(np.append(True, runs[1:, 0] > reach[:-1] + SLIVER_MM))
+    starts = np.flatnonzero(np.append(True, runs[1:, 0] > reach[:-1] + slit_mm))
     return np.column_stack([runs[starts, 0], reach[np.append(starts[1:], len(runs)) - 1]])
 
 
@@ -440,20 +441,19 @@ def _of_tools(design: Design, motion: Motion) -> Paths:
 
 def connected(start_mm: Real, end_mm: Real) -> Whole:
     """Number of the connected group of each line in plan: lines of a group have no gap of ``APART_MM`` between them."""
-    from scipy import ndimage
-
     start_mm, end_mm = (np.clip(place, -_FAR_MM, _FAR_MM) for place in (start_mm, end_mm))
     way = end_mm - start_mm
     count = np.maximum(np.ceil(np.abs(way).max(1) / _CELL_MM), 1).astype(np.int64) + 1
     which = np.repeat(np.arange(len(count)), count)
     share = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)) / (count[which] - 1)
     cell = np.floor((start_mm[which] + share[:, None] * way[which]) / _CELL_MM).astype(np.int64)
-    cell -= cell.min(0, initial=0)
-    filled = np.zeros(cell.max(0, initial=0) + 1, bool)
-    filled[cell[:, 0], cell[:, 1]] = True
-    label, _ = ndimage.label(filled, np.ones((3, 3)))
-    first = cell[np.cumsum(count) - count]
-    return np.asarray(label[first[:, 0], first[:, 1]])
+    x, y = (cell - cell.min(0, initial=0)).T
+    column = y.max(initial=0) + 2
+    filled, at = np.unique(x * column + y, return_inverse=True)
+    beside = filled + np.array([[1], [column - 1], [column], [column + 1]])
+    near = np.searchsorted(filled, beside).clip(max=len(filled) - 1)
+    touch = filled[near] == beside
+    return np.asarray(groups(len(filled), touch.nonzero()[1], near[touch])[at[np.cumsum(count) - count]])
 
 
 def _turned(paths: Paths) -> Paths:

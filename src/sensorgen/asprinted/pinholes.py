@@ -14,6 +14,7 @@ import shapely
 from shapely import Polygon
 
 from sensorgen.asprinted.beads import Beads, beads
+from sensorgen.asprinted.printed import SHIFT_MM
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.findings import Finding
@@ -24,7 +25,6 @@ from sensorgen.scene.layers import Region, drawn, parts
 from sensorgen.scene.scene import Point
 
 WIDTHS = (1.0, 0.95, 0.9)  # of the lines, of what the file says
-SHIFT_MM = 0.05  # of a layer to both sides along x and y
 _WHOLE = 0.99  # share of the plan that a film covers
 _EDGE_MM = 1.0
 _LEAST_MM2 = 1e-6  # smaller is rounding

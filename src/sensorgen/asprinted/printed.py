@@ -6,7 +6,7 @@ drawing's mirrors say where a period starts and ends.
 """
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -41,7 +41,9 @@ from sensorgen.scene.scene import SLIVER_MM, rounded
 from sensorgen.scene.sections import square_to
 from sensorgen.scene.slabs import is_open
 
-ROUNDED_MM = 2e-3  # edges nearer than this are one: G-code has three decimals
+SHIFT_MM = 0.05  # of a layer or strip to both sides along x and y, which a printer may miss its place by
+_ROUNDED_MM = SHIFT_MM / 10  # edges nearer than this are one: no printer parts them, nor prints a weld as narrow
+_GRID_MM = 1e-3  # of corners: G-code has three decimals
 
 
 @dataclass(frozen=True)
@@ -170,21 +172,26 @@ def _of_strips(regions: Sequence[Region], size_mm: Sequence[float], axis: int) -
     return piece[0].left_mm, piece[-1].right_mm
 
 
-def cut(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:
+def cut(layers: Sequence[LayerRegions], to: Window, without: Container[str] = ()) -> list[LayerRegions]:
     """The part of some layers within a window, moved to the origin, with edges that rounding parted made one [mm]."""
     (x0, x1), (y0, y1) = to.x_mm, to.y_mm
     moved = []
     for layer in layers:
-        inside = {n: translate(shapely.clip_by_rect(r, x0, y0, x1, y1), -x0, -y0) for n, r in layer.regions.items()}
-        moved.append(layer.mapped(inside))
-    drawn = shapely.get_coordinates([region for layer in moved if layer.along for region in layer.regions.values()])
+        inside = {n: shapely.clip_by_rect(r, x0, y0, x1, y1) for n, r in layer.regions.items() if n not in without}
+        moved.append(layer.mapped({n: translate(r, -x0, -y0) for n, r in inside.items()}))
+    return joined(moved, to)
+
+
+def joined(layers: Sequence[LayerRegions], of: Window) -> list[LayerRegions]:
+    """Layers of a window with edges that rounding parted made one, alike to both sides."""
+    drawn = shapely.get_coordinates([region for layer in layers if layer.along for region in layer.regions.values()])
     places = []  # edges, rising, and where each goes: to the middle of those that rounding parted, or to the side
-    for axis, side in enumerate(to.sides_mm()):
+    for axis, side in enumerate(of.sides_mm()):
         edges = np.unique(np.append(drawn[:, axis], [0.0, side]))
-        groups = np.split(edges, np.flatnonzero(np.diff(edges) >= ROUNDED_MM) + 1)
-        middles = [np.full(len(g), round(float(g.mean()), 6)) for g in groups[1:-1]]
-        places.append((edges, np.concatenate([0.0 * groups[0], *middles, 0.0 * groups[-1] + side])))
-    return [layer.mapped({n: _moved(r, places, layer.along) for n, r in layer.regions.items()}) for layer in moved]
+        groups = np.split(edges, np.flatnonzero(np.diff(edges) >= _ROUNDED_MM) + 1)
+        middles = [np.full(len(g), g.mean() - side / 2).round(9).round(6) + side / 2 for g in groups[1:-1]]
+        places.append((edges, np.concatenate([0.0 * groups[0], *middles, 0.0 * groups[-1] + side]).round(9)))
+    return [layer.mapped({n: _moved(r, places, layer.along) for n, r in layer.regions.items()}) for layer in layers]
 
 
 def _moved(region: Region, places: list[tuple[Real, Real]], along: str) -> Region:
@@ -197,17 +204,17 @@ def _moved(region: Region, places: list[tuple[Real, Real]], along: str) -> Regio
     high = np.array([to[-1] for _, to in places])
 
     def to_sides(at: Real) -> Real:
-        return np.where(at < ROUNDED_MM, 0.0, np.where(at > high - ROUNDED_MM, high, at))
+        return np.where(at < _ROUNDED_MM, 0.0, np.where(at > high - _ROUNDED_MM, high, at))
 
-    return cleaned(shapely.transform(shapely.set_precision(region, ROUNDED_MM / 2), to_sides))
+    return cleaned(shapely.transform(shapely.set_precision(region, _GRID_MM), to_sides))
 
 
 def evened(layers: Sequence[LayerRegions], to: Window, within_mm: float = np.inf) -> list[LayerRegions]:
     """Layers of a window with each strip as far to one side as its mirror image is to the other [mm].
 
-    For crossed strips, whose lopsided cell would take sixteen times the bricks, and for cells that rounding alone made
-    lopsided: as they are where a strip would move by ``within_mm`` or more. Widths stay; a strip that is printed a
-    little aside moves to its place, which changes the field in second order.
+    For crossed strips, whose lopsided cell would take sixteen times the bricks, and for cells that are lopsided by no
+    more than a printer may be: as they are where a strip would move by ``within_mm`` or more. Widths stay; a strip that
+    is printed a little aside moves to its place, which changes the field in second order.
     """
     sides, even = np.array([*to.sides_mm(), *to.sides_mm()]), []
     for layer in layers:
@@ -217,9 +224,7 @@ def evened(layers: Sequence[LayerRegions], to: Window, within_mm: float = np.inf
             mirrored = (sides - bounds)[::-1][:, [2, 3, 0, 1]]
             if np.abs(mirrored - bounds).max(initial=0.0) >= 2 * within_mm:
                 return list(layers)
-            middle = ((bounds + mirrored - sides) / 2).round(9).round(6) + sides / 2  # alike to both sides
-            middle = np.where((bounds <= 0) | (bounds >= sides), bounds, middle)  # sides have more decimals
-            regions[name] = shapely.union_all(shapely.box(*middle.round(9).T))
+            regions[name] = shapely.union_all(shapely.box(*((bounds + mirrored) / 2).T))
         even.append(layer.mapped(regions))
     return even
 
@@ -280,7 +285,8 @@ class Printed:
         plan = Window((0.0, whole.size_mm[0]), (0.0, whole.size_mm[1])) if fringe else window(whole, boundaries)
         if self.design.border:
             plan = inside(plan, whole, drawn(self.design.printed, boundaries))
-        return {name: cell(self.design, own.layers, own.bodies, plan) for name, own in self._connected.items()}
+        aside = _ROUNDED_MM if self.lines is None else SHIFT_MM
+        return {name: cell(self.design, own.layers, own.bodies, plan, aside) for name, own in self._connected.items()}
 
     @cached_property
     def _connected(self) -> "dict[str, Connected]":
@@ -298,12 +304,6 @@ class Printed:
     def cell(self) -> PrintCell:
         """The unit cell by the first convention."""
         return next(iter(self.cells.values()))
-
-    @property
-    def gap_mm(self) -> Point:
-        """Smallest and largest electrode gap of the conventions [mm]."""
-        gaps = [gap_mm(cell.scene) for cell in self.cells.values()]
-        return min(gaps), max(gaps)
 
     @cached_property
     def rows(self) -> list[LayerVolume]:
@@ -366,7 +366,6 @@ def body(
         layers = estimate.layers(design.printed, design.machine, design.layers, walls, laid, shift)
         return Printed(design, f"printed, estimated ({WALLS[walls]})", {"mid-plane": layers})
     from sensorgen.asprinted.beads import CONVENTIONS, beads
-    from sensorgen.asprinted.beads import layers as printed_layers
 
     lines = beads(design, paths, centre_mm)
     if not len(lines.number):
@@ -375,8 +374,7 @@ def body(
             f"no line of {design.name} in this G-code: expected tools {tools} in layers of "
             f"{design.layers.layer_mm:g} mm at its place on the bed; was it sliced from this design?"
         )
-    by_convention = {name: printed_layers(design, lines, name) for name in CONVENTIONS}
-    return Printed(design, f"printed, {slicer or 'from G-code'}", by_convention, lines)
+    return _of_lines(design, lines, CONVENTIONS, slicer)
 
 
 def nominal(design: Design, paths: "Paths", slicer: str = "", centre_mm: Point | None = None) -> Printed:
@@ -388,14 +386,21 @@ def nominal(design: Design, paths: "Paths", slicer: str = "", centre_mm: Point |
         As of :func:`body`; here a file that prints nothing of the design is no error.
     """
     from sensorgen.asprinted.beads import CONVENTIONS, beads
-    from sensorgen.asprinted.beads import layers as printed_layers
 
-    lines, first = beads(design, paths, centre_mm), CONVENTIONS[0]
-    provenance = f"printed, {slicer or 'from G-code'}"
-    return Printed(design, provenance, {first: printed_layers(design, lines, first)}, lines)
+    return _of_lines(design, beads(design, paths, centre_mm), CONVENTIONS[:1], slicer)
 
 
-def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body], plan: Window) -> PrintCell:
+def _of_lines(design: Design, lines: "Beads", conventions: Sequence[str], slicer: str) -> Printed:
+    """A design as some lines print it."""
+    from sensorgen.asprinted.beads import layers
+
+    by_convention = {name: layers(design, lines, name) for name in conventions}
+    return Printed(design, f"printed, {slicer or 'from G-code'}", by_convention, lines)
+
+
+def cell(
+    design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body], plan: Window, aside_mm: float = SHIFT_MM
+) -> PrintCell:  # fmt: skip
     """The unit cell of printed layers.
 
     Parameters
@@ -408,18 +413,19 @@ def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body],
         Whose regions they hold.
     plan : Window
         The drawing's.
+    aside_mm : float
+        By which a strip may lie aside of its place; of an estimate none does [mm].
     """
     scene = design.printed
-    inside = cut(layers, plan)
+    inside = cut(layers, plan, {body.name for body in bodies if body.is_support()})
     crossed = all(side < whole for side, whole in zip(plan.sides_mm(), scene.size_mm[:2], strict=True))
     if not any(plan.repeats):
-        inside = evened(inside, plan) if crossed else evened(inside, plan, ROUNDED_MM)
+        inside = joined(evened(inside, plan, np.inf if crossed else aside_mm), plan)
     like = replace(scene, bodies=tuple(bodies), size_mm=(*plan.sides_mm(), scene.size_mm[2]), repeats=plan.repeats)
     scene_here = scene_of(inside, like)
     if design.orientation == "upside-down":
         scene_here = scene_here.turned_over()
-    in_use = replace(scene_here, bodies=tuple(b for b in scene_here.bodies if not b.is_support()))
-    smaller = in_use.stretched(1.0 - design.shrinkage) if design.shrinkage else in_use
+    smaller = scene_here.stretched(1.0 - design.shrinkage) if design.shrinkage else scene_here
     return PrintCell(smaller, scene.size_mm[0] * scene.size_mm[1] / plan.area_mm2())
 
 

@@ -268,9 +268,9 @@ def report_command(
     show_it, --open
         Show the page in the browser.
     """
-    from sensorgen.analysis.report import FORMATS, STEPS, pieces, report
+    from sensorgen.analysis.report import STEPS, pieces, report
 
-    how = how or next((end for end in FORMATS if output.endswith(f".{end}")), "html")
+    how = how or _form(output)
     if show_it and (how != "html" or output == "-"):
         raise BadInput("--open shows an HTML file; expected --format html and a file")
     with log.opened() as rows, render.progress(STEPS) as step:
@@ -284,6 +284,13 @@ def report_command(
     _write(compared, path, how)
     if show_it:
         webbrowser.open(path.resolve().as_uri())
+
+
+def _form(output: str) -> str:
+    """Format of a report by its file's name; HTML of any other."""
+    from sensorgen.analysis.report import FORMATS
+
+    return next((form for form in FORMATS if output.endswith(f".{form}")), "html")
 
 
 def _which(compared: "Report", iteration: int | None) -> str:

@@ -174,8 +174,8 @@ def _fitted(
     readings, by_ac = dict(data.readings), estimates.along(fits)  # AC readings of one specimen tell, as the bench's do
     results = [
         estimates.resistivity([*(readings | by_ac).values()], electrode, 1 if by_ac else estimates.LEAST),
-        *estimates.values(fits),
         estimates.leak([*readings.values()], film, seed),
+        *estimates.values(fits),
     ]
     best = dict[tuple[str, str], Fitted]()
     for one in results:

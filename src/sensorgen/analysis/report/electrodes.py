@@ -63,14 +63,13 @@ def readings(comparison: Comparison) -> Table:
 
     def row_of(k: int) -> ReadingRow:
         row = comparison.direct[k]
-        r, v = row.reading, row.verdict
+        r, v, of = row.reading, row.verdict, row.evidence
         expected = row.expected_ohm
         bounds = (expected.lower, expected.value, expected.upper) if expected else (nan, nan, nan)
+        along, across = ((min(ohm, default=nan), max(ohm, default=nan)) for ohm in (of.ry_ohm, of.rz_ohm))
         return ReadingRow(
-            r.number, r.specimen, row.predicted.design if row.predicted else "", v.ry_ohm,
-            max(row.evidence.ry_ohm, default=nan), _error(row), *bounds, exp(row.residual),
-            {None: "", True: "yes", False: "no"}[row.inside], v.rz_ohm, max(row.evidence.rz_ohm, default=nan), v.ratio,
-            v.leak_s, v.word,
+            r.number, r.specimen, row.predicted.design if row.predicted else "", *along, _error(row), *bounds,
+            exp(row.residual), {None: "", True: "yes", False: "no"}[row.inside], *across, v.ratio, v.leak_s, v.word,
         )  # fmt: skip
 
     off = np.array([-abs(row.residual) if isfinite(row.residual) else 1.0 for row in comparison.direct])

@@ -351,32 +351,36 @@ Jumps = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class _Share:
-    """Map from the unknowns to the values on one block.
+    """Map from the unknowns to the values on blocks of one size.
 
     Attributes
     ----------
-    ids, signs : (k,) array
+    ids, signs : (n, k) array
         The unknown of each value, and 1 or -1.
-    jumps : list of (int, int)
-        Places of values to which another unknown adds, and that one.
+    jumps : mapping of int to list of (int, int)
+        By block, places of values to which another unknown adds, and that one.
     """
 
     ids: Whole
     signs: Real
-    jumps: Jumps
+    jumps: Mapping[int, Jumps]
 
-    def block(self, matrix: Numbers, place: Real) -> Block:
+    def blocks(self, matrices: Numbers, places: Real) -> list[Block]:
         """For the solver."""
-        rows = np.array([*range(len(self.ids)), *(k for k, _ in self.jumps)])
-        ids = np.array([*self.ids, *(jump for _, jump in self.jumps)])
-        signed = self.signs[:, None] * matrix * self.signs
-        return Block(ids, signed[rows[:, None], rows], place) if self.jumps else Block(self.ids, signed, place)
+        signed = self.signs[:, :, None] * matrices * self.signs[:, None, :]
+        blocks = [Block(*parts) for parts in zip(self.ids, signed, places, strict=True)]
+        for number, jumps in self.jumps.items():
+            rows = np.array([*range(len(self.ids[number])), *(k for k, _ in jumps)])
+            ids = np.array([*self.ids[number], *(jump for _, jump in jumps)])
+            blocks[number] = Block(ids, signed[number][rows[:, None], rows], places[number])
+        return blocks
 
     def values(self, unknowns: Numbers) -> Numbers:
-        """On the block."""
+        """On each block (n, k)."""
         own = unknowns[self.ids]
-        for place, jump in self.jumps:
-            own[place] += unknowns[jump]
+        for number, jumps in self.jumps.items():
+            for place, jump in jumps:
+                own[number, place] += unknowns[jump]
         return np.asarray(own * self.signs)
 
 
@@ -419,17 +423,16 @@ class PlaneProblem:
     def solved(self, flow: Flow | None = None) -> Field:
         """The function of least energy, less twice what flows into the top where a flux is sought."""
         points = self.mesh.triangles.points
-        plain, cones = self._plain_shares(), [self._cone(c, e) for c, e in zip(self.mesh.fans, self.cones, strict=True)]
+        plain, cones = self._plain_share(), [self._cone(c, e) for c, e in zip(self.mesh.fans, self.cones, strict=True)]
         rims = [self._rim(corner, cone.layout) for corner, cone in zip(self.mesh.fans, cones, strict=True)]
         energies = self.weight[self.mesh.plain, None, None] * self.plain
         places = points[self.mesh.corners[self.mesh.plain, 0]]
-        blocks = [share.block(*parts) for share, *parts in zip(plain, energies, places, strict=True)]
-        corners = points[list(self.mesh.fans)]
-        blocks += [rim.block(cone.matrix, at) for rim, cone, at in zip(rims, cones, corners, strict=True)]
+        blocks, corners = plain.blocks(energies, places), points[list(self.mesh.fans)][:, None]
+        for rim, cone, at in zip(rims, cones, corners, strict=True):
+            blocks += rim.blocks(cone.matrix[None], at)
         unknowns = least([*blocks, self._rise(flow)] if flow else blocks, self._unknowns[0]).values()
-        inside = [cone.inside(rim.values(unknowns)) for cone, rim in zip(cones, rims, strict=True)]
-        on_plain = np.array([share.values(unknowns) for share in plain])
-        return Field(on_plain, inside)
+        inside = [cone.inside(rim.values(unknowns)[0]) for cone, rim in zip(cones, rims, strict=True)]
+        return Field(plain.values(unknowns), inside)
 
     @cached_property
     def _unknowns(self) -> tuple[int, Whole, Whole]:
@@ -447,25 +450,18 @@ class PlaneProblem:
         first[open_sides] = count + modes * np.arange(open_sides.sum())
         return count + modes * int(open_sides.sum()), vertex, first
 
-    def _plain_shares(self) -> list[_Share]:
-        mesh = self.mesh
-        _, vertex, first = self._unknowns
-        ids, signs = numbered(mesh.corners[mesh.plain], vertex, first[mesh.sides[1]], self.order)
-        corners = mesh.triangles.triangles
-        jumps = [
-            [(corners[n].index(point), jump) for point, jump in self.lifts.get(n, ())] for n in mesh.plain.tolist()
-        ]
-        return [_Share(*parts) for parts in zip(ids, signs, jumps, strict=True)]
+    def _plain_share(self) -> _Share:
+        mesh, (_, vertex, first) = self.mesh, self._unknowns
+        corners, at = mesh.triangles.triangles, {n: k for k, n in enumerate(mesh.plain.tolist())}
+        jumps = {at[n]: [(corners[n].index(p), jump) for p, jump in own] for n, own in self.lifts.items() if n in at}
+        return _Share(*numbered(mesh.corners[mesh.plain], vertex, first[mesh.sides[1]], self.order), jumps)
 
     def _cone(self, corner: int, energies: tuple[Real, Real]) -> Cone:
         fan, (rings, tips) = self.mesh.fans[corner], energies
-        ends = self._is_wall(corner, fan.spokes[0]), self._is_wall(corner, fan.spokes[-1])
-        layout = RingLayout.of(len(fan.spokes), fan.closed, ends, self.order)
+        first, last = ((min(corner, end), max(corner, end)) in self.walls for end in (fan.spokes[0], fan.spokes[-1]))
+        layout = RingLayout.of(len(fan.spokes), fan.closed, (first, last), self.order)
         here = self.weight[fan.members][:, None, None]
         return Cone.of(layout, rings * here[:, None], tips * here, self.mesh.doublings[corner])
-
-    def _is_wall(self, a: int, b: int) -> bool:
-        return (min(a, b), max(a, b)) in self.walls
 
     def _rim(self, corner: int, layout: RingLayout) -> _Share:
         """Values that a cone shares with its neighbours, in its own turn."""
@@ -481,7 +477,8 @@ class PlaneProblem:
         ids = np.concatenate([vertex[free], (on_side[:, None] + modes).ravel(), fixed])
         signs = np.concatenate([np.ones(len(free)), sign.ravel(), np.ones(len(fixed))])
         lifts = {lift for n in fan.members for lift in self.lifts.get(n, ())}
-        return _Share(ids, signs, [(free.tolist().index(point), jump) for point, jump in sorted(lifts)])
+        jumps = [(free.tolist().index(point), jump) for point, jump in sorted(lifts)]
+        return _Share(ids[None], signs[None], {0: jumps} if jumps else {})
 
     def _rise(self, flow: Flow) -> Block:
         """Minus the function's rise along the top, as an energy with the unknown 1, whose value is 1."""
