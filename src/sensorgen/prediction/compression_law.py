@@ -31,7 +31,7 @@ from sensorgen.scene.scene import Body, Point, Scene, box
 from sensorgen.scene.sections import sections
 
 if TYPE_CHECKING:
-    from sensorgen.models.press2d import BoundaryConditions, Elastic, Pressed
+    from sensorgen.models.press2d import BoundaryConditions, Elastic
 
 CLOSED_FORM = LAWS[:4]
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)), 1.2e5)  # 6 N on a tip of 5 x 10 mm are 120 kPa
@@ -534,10 +534,7 @@ def under_tops(
     design: Design, piece: PressedPiece, model: str, tip: Tip, own: CapacitanceCurve,
     boundary: "BoundaryConditions | None" = None,
 ) -> dict[str, CapacitanceCurve]:  # fmt: skip
-    """Curves under an even pressure and a stiff plate, by the ratio of rises on a coarse mesh.
-
-    Of a smooth curve the ratio hardly changes with the pressure (by 3e-3 up to 400 kPa): that at half of the last one
-    serves for all.
+    """Curves under an even pressure and a stiff plate, by the ratio of rises on the coarsest mesh.
 
     Parameters
     ----------
@@ -548,43 +545,27 @@ def under_tops(
     """
     loads, level = [own.stress_pa[-1] * share for share in mesh_ladder.COARSE], mesh_ladder.coarsest(model)
 
-    def case(block: str) -> Case:
-        return case_of(design, piece, model, replace(tip, block=block), boundary)
-
     def rise(block: str) -> Real:
         try:
-            return _rise(pressed(case(block), loads, level).sound())
+            solution = pressed(case_of(design, piece, model, replace(tip, block=block), boundary), loads, level).sound()
         except SensorgenError:
             return np.zeros(0)
+        values = np.array([c.middle() if c else np.nan for c in solution.capacitance_f_per_m2])
+        rises: Real = values[1:] - values[0]
+        return rises
 
-    if smooth := mesh_ladder.smooth_curve(case(tip.block), own.stress_pa, mesh_ladder.USUAL - 1):
-        half = smooth.some([0, 2])
-        loads, level, reference = half.stress_pa.tolist(), mesh_ladder.USUAL - 1, _rise(half)
-    else:
-        reference = rise(tip.block)
-    curves = {tip.block: own} if not tip.soft else {}
+    reference, curves = rise(tip.block), {tip.block: own} if not tip.soft else {}
     for block in {EVEN, STIFF} - {tip.block}:
         under = rise(block)
         n = min(len(reference), len(under))
         if n and np.isfinite(ratio := under[:n] / reference[:n]).all():
-            known = [p for p in own.stress_pa if smooth or p <= loads[n]]
-            curves |= _rising(block, own, known, np.interp(known, loads[1 : n + 1], ratio))
+            known = [p for p in own.stress_pa if p <= loads[n]]
+            rises = (np.array(own.ratio[: len(known)]) - 1) * np.interp(known, loads[1 : n + 1], ratio)
+            end = 1 + int(np.argmin(np.append(np.diff(rises) > 0, False)))  # a coarse mesh may fall after a contact
+            if end > 1:
+                other = compression.curve(own.name, own.source, known[:end], (1 + rises[:end]).tolist())
+                curves[block] = replace(other, within=own.within)
     return curves
-
-
-def _rising(name: str, own: CapacitanceCurve, stress_pa: Sequence[float], ratio: Real) -> dict[str, CapacitanceCurve]:
-    """A curve by name whose rises are in a ratio to those of another one, as far as it rises."""
-    rises = (np.array(own.ratio[: len(ratio)]) - 1) * ratio
-    end = 1 + int(np.argmin(np.append(np.diff(rises) > 0, False)))  # a coarse mesh may fall after a contact
-    curve = compression.curve(own.name, own.source, stress_pa[:end], (1 + rises[:end]).tolist()) if end > 1 else None
-    return {name: replace(curve, within=own.within)} if curve else {}
-
-
-def _rise(solution: "Pressed") -> Real:
-    """Rise of the capacitance under each pressure above 0 [F/m2]; NaN where unknown."""
-    values = np.array([c.middle() if c else np.nan for c in solution.capacitance_f_per_m2])
-    rises: Real = values[1:] - values[0]
-    return rises
 
 
 def _few_pa(stress_pa: float, tip: Tip) -> Real:

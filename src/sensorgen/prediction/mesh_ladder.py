@@ -312,15 +312,22 @@ def _smooth(
 
     None where faces touch, or the curve bends too much for that.
     """
-    coarse = smooth_curve(case, stress_pa, level - 1, keep=keep)
-    if coarse is None:
+    loads = _few(stress_pa)
+    if not len(COARSE) == len(loads) < len(stress_pa) or not _may_be_smooth(case, level):
+        return None
+    coarse = pressed(case, loads, level - 1, keep=keep)
+    if coarse.faults or coarse.penetration.any():
+        return None
+    some = np.divide(loads[1:], loads[-1])
+    secants = np.column_stack([coarse.displacement_m, _rise(coarse)[0]])[1:] / some[:, None]
+    (quarter, half, whole), share = secants, (1 - some[1]) / (1 - some[0])
+    if np.abs((share * quarter + (1 - share) * whole) / half - 1).max() > _BENT:
         return None
     fine = pressed(case, [0.0, stress_pa[-1]], level, keep=keep, step=step)
     if fine.faults or fine.penetration.any():
         return None
-    some, secants = _secants(coarse)
     at = np.divide(stress_pa, stress_pa[-1])
-    curve = np.polyfit(some, secants / secants[-1], len(some) - 1)
+    curve = np.polyfit(some, secants / whole, len(some) - 1)
     shares = at[:, None] * (np.vander(at, len(some)) @ curve)
     (first, last), loaded = _ends(fine), [1] * (len(stress_pa) - 1)
     bounds = first + shares[:, 1:] * (last - first)
@@ -332,37 +339,14 @@ def _smooth(
     return continued, coarse
 
 
-def smooth_curve(case: Case, stress_pa: Sequence[float], level: int, *, keep: bool = True) -> "Pressed | None":
-    """Solution on a coarse mesh at those of some pressures that are nearest to ``COARSE``.
-
-    None where faces touch, the curve bends too much to be continued by it, or the pressures are too few.
-    """
-    loads = _few(stress_pa)
-    if not len(COARSE) == len(loads) < len(stress_pa) or not _may_be_smooth(case, level):
-        return None
-    coarse = pressed(case, loads, level, keep=keep)
-    if coarse.faults or coarse.penetration.any():
-        return None
-    some, (quarter, half, whole) = _secants(coarse)
-    share = (1 - some[1]) / (1 - some[0])
-    bent = np.abs((share * quarter + (1 - share) * whole) / half - 1).max() > _BENT
-    return None if bent else coarse
-
-
-def _secants(solution: "Pressed") -> tuple[Real, Real]:
-    """Pressures over the last one (n,), and displacement and rise over them (n, 2) [m, F/m2]."""
-    some = solution.stress_pa[1:] / solution.stress_pa[-1]
-    return some, np.column_stack([solution.displacement_m, _rise(solution)[0]])[1:] / some[:, None]
-
-
 def _may_be_smooth(case: Case, level: int) -> bool:
-    """Test whether there is a mesh, and no point in which solids touch as drawn: gaps close from there on."""
+    """Test whether there is a coarser mesh, and no point in which solids touch as drawn: gaps close from there on."""
     from sensorgen.models import press2d
     from sensorgen.solvers.contact.mesh import pinches
 
     if case.model == "press2d":
         return not pinches(press2d.cell(case.piece.scene, case.piece.period_mm))
-    return case.model == "press3d" and _size(case.model, level) < inf
+    return case.model == "press3d" and _size(case.model, level - 1) < inf
 
 
 def _coarser(case: Case, fine: "Pressed", stress_pa: Sequence[float], level: int, *, keep: bool) -> "Pressed":
