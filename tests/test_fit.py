@@ -94,6 +94,20 @@ def test_specimens_of_one_plate_do_not_tell_how_prints_differ():
     assert alone.high / alone.value < 1.03
 
 
+def test_ac_readings_of_a_dry_joint_are_no_resistivity(tmp_path):
+    """Its multimeter reads 25 times what the others do."""
+    names = [f"60 SX60 {k}" for k in range(2, 7)]
+    rows = [
+        notes.reading(name, ohm, "OL")
+        for name, ohm in zip(names, ("1.2k", "1.3k", "1.25k", "1.22k", "30k"), strict=True)
+    ]
+    joint = notes.with_ac(notes.reading(names[-1]), {"R": ["20k@100kHz"], "X": ["-27kohm@100kHz"]})
+    with Log(tmp_path / "log.db", create=True) as log, roughly_at_rest():
+        log.add([*rows, joint])
+        found = value(fit(log, 60, held_share=0.0), "resistivity_ohm_m")
+    assert found.high / found.low < 2.0
+
+
 def test_one_film_that_is_tight_makes_leaks_no_property():
     films = [AllowedValues(0.0, 0.0, leak=at) for at in (-7.0, -7.01, -7.02, -math.inf)]
     assert isinstance(leak(films[:3], "x60", 1), Fitted)
@@ -403,7 +417,7 @@ def test_specimens_of_any_name(tmp_path, capsys):
     assert "relative_permittivity" in said.partition("not determined")[0]
     assert "resistivity_ohm_m" in said.partition("not determined")[0]
     words = ["log", "add", "S6", "--design", str(file), "--C", "1e999pF@1kHz", "--log", place]
-    with pytest.raises(BadInput, match="more than a number can hold"):
+    with pytest.raises(BadInput, match="no value"):
         cli.main(words, standalone_mode=False)
     with pytest.raises(BadInput, match="expected either specimens"):
         cli.main(["fit", "S1", "--iteration", "3", "--log", place], standalone_mode=False)

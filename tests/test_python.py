@@ -170,6 +170,18 @@ def test_a_softer_specimen_is_within_the_intervals_of_its_design():
     assert 9.0 < low < 12.0 < high
 
 
+def test_readings_that_are_none_are_refused_and_what_they_do_not_tell_is_blank():
+    tones = [1.1e3, 1e5]
+    z = sg.predict(PLATE, frequency_hz=tones, force_n=[0.0, 12.0], position_mm=50).impedance.impedance_ohm[..., 0].T
+    for given in ({"noise": 0.0}, {"noise": 5.0}, {"rest_ohm": z[0, :1]}, {"rest_ohm": z[:1], "perfect": True}):
+        with pytest.raises(BadInput, match="expected"):
+            sg.invert(PLATE, tones, z[1:], **{"rest_ohm": z[:1]} | given if "perfect" not in given else given)
+    with pytest.raises(BadInput, match="a column for each frequency"):
+        sg.invert(PLATE, tones, z[1:, :1], rest_ohm=z[:1])
+    blank = sg.invert(PLATE, tones, z[1:], perfect=True)
+    assert (blank.statuses(), np.isnan(blank.position_m).all()) == (["not identifiable"], True)
+
+
 def test_a_design_is_pressed_by_its_own_tip():
     wide = sg.Design(shape="reference", tip={"shape": "flat", "width_mm": 30.0})
     assert "tip 30 mm" in sg.predict(wide, force_n=6.0, position_mm=50.0).text()

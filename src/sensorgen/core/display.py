@@ -103,5 +103,6 @@ class Displayed:
         pd = library("pandas", "to_pandas() needs pandas: pip install pandas")
         if hasattr(self, "csv"):
             return pd.read_csv(StringIO("".join(self.csv())))
-        table = self.table() if hasattr(self, "table") else next(p for p in parts(self) if isinstance(p, Table))
-        return pd.DataFrame(list(table.cells), columns=[column.key or column.head for column in table.columns])
+        table = self.table() if hasattr(self, "table") else next((p for p in parts(self) if isinstance(p, Table)), None)
+        columns = [column.key or column.head for column in table.columns] if table else []
+        return pd.DataFrame(list(table.cells) if table else [], columns=columns)

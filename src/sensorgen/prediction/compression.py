@@ -525,7 +525,7 @@ def _under_tops(
     stress, at_rest = estimate.found.stress_pa, estimate.found.capacitance_f_per_m2[0]
     at_rest_f_per_m2 = at_rest.middle() if at_rest else nan
     for name, law in laws.items():
-        strain = law.capacitive_strain(stress)[0]
+        strain = law.capacitive_strain(np.minimum(stress, law.stress_pa[-1]))[0]
         rise = np.where(stress <= law.stress_pa[-1], at_rest_f_per_m2 * strain / (1 - strain), nan)
         if name != tip.block and (abs(rise - estimate.rise_f_per_m2) > estimate.rise_error_f_per_m2).any():
             yield name, _known(rise)

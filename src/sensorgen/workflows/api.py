@@ -388,9 +388,9 @@ def invert(
     impedance_ohm : (n, m) complex array
         Readings under load [ohm].
     rest_ohm : (m,) or (k, m) complex array
-        Readings with nothing on the sensor, just before [ohm]: what counts is the ratio to their mean.
+        Readings with nothing on the sensor, just before [ohm]: what counts is the ratio to the mean of the last 64.
     noise : float, optional
-        Standard deviation of Re Z and of Im Z of a reading, relative to abs(Z) [-]; by the scatter of eight or more
+        Standard deviation of Re Z and of Im Z of a reading, relative to abs(Z) [-]; by the scatter of nine or more
         readings at rest, else 0.1 %, if not given.
     perfect : bool
         As if the sensor were exactly as predicted, and no reading at rest were needed: a real one is not.
@@ -417,19 +417,29 @@ def invert(
         raise BadInput(
             "an array has many presses at once; expected its frames in a file, by the command sensorgen invert"
         )
-    z, at_rest = np.asarray(impedance_ohm, complex), np.atleast_2d(np.asarray(rest_ohm, complex))
-    if not perfect and at_rest.shape[1] != len(frequency_hz):
+    f, z = np.atleast_1d(np.asarray(frequency_hz, float)), np.asarray(impedance_ohm, complex)
+    at_rest = np.atleast_2d(np.asarray(rest_ohm, complex))
+    if z.ndim != 2 or z.shape[1] != len(f):
+        raise BadInput(f"impedance_ohm of shape {z.shape}; expected (n, {len(f)}), a column for each frequency")
+    if noise is not None and not 0 < noise <= 1:
+        raise BadInput(f"noise={noise!r:.20}; expected a number above 0, up to 1")
+    if perfect and at_rest.size:
+        raise BadInput("rest_ohm beside perfect=True, which needs no reading at rest; expected one of them")
+    if not perfect and (at_rest.shape[1:] != f.shape or not len(at_rest)):
         raise BadInput(
             f"rest_ohm of shape {np.shape(rest_ohm)}; expected readings with nothing on the sensor, a column for each "
-            f"of the {len(frequency_hz)} frequencies (or perfect=True, as if the sensor were as predicted)"
+            f"of the {len(f)} frequencies (or perfect=True, as if the sensor were as predicted)"
         )
     model, _ = sensor_model(_body(what))
     if perfect:
-        return Estimator(model.sensor, tuple(frequency_hz), NOISE if noise is None else noise).batch(z)
+        return Estimator(model.sensor, tuple(f.tolist()), NOISE if noise is None else noise).batch(z).identified()
     rest = Rest(at_rest)
+    mean, count = rest.mean()
     one = rest.noise() if noise is None else noise
-    by = inversion.of_design(model, np.asarray(frequency_hz, float), rest, one * np.sqrt(1 + 1 / len(at_rest)))
-    return by.batch(np.log(z / rest.mean()[0]))
+    by = inversion.of_design(model, f, rest, one * np.sqrt(1 + 1 / count))
+    presses = by.batch(np.log(np.where(z == 0, np.nan, z) / mean))
+    inversion.doubt_rest(presses, np.zeros(len(z), bool), 0)
+    return presses
 
 
 def calibrate(log: Log, *specimens: str, bench: Bench | None = None) -> list[Calibration]:

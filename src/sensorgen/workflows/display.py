@@ -69,10 +69,13 @@ def _(of: Built) -> "Figure":
 
 @display.parts.register(Comparison)
 def _(of: Comparison) -> "tuple[Part, ...]":
-    from sensorgen.analysis.report import electrodes, yields
+    from sensorgen.analysis.report import alternating, electrodes, yields
+    from sensorgen.core.document import Table
 
+    ac = alternating.rows(of)
     tables = (electrodes.readings(of), yields.table(of)) if of.direct else ()
-    return (*electrodes.headline(of), *yields.headline(of), *tables)
+    words = (*electrodes.headline(of), *yields.headline(of), *alternating.headline(ac))
+    return (*words, *tables, *Table.some("ac", "AC readings and their prediction", ac))
 
 
 @display.figure.register(Comparison)

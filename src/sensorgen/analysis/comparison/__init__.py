@@ -199,9 +199,10 @@ def _partners(rows: Iterable[Measured]) -> dict[int, int]:
     partner, latest = dict[int, int](), dict[tuple[str, bool | None, bool], int]()
     waiting: dict[tuple[str, bool | None, bool], list[int]] = defaultdict(list)
     for place, reading in enumerate(rows):
-        for along, ohm, other in ((True, reading.y_ohm, reading.z_ohm), (False, reading.z_ohm, reading.y_ohm)):
+        known = [any(ohm >= 0 for ohm in values) for values in (reading.y_ohm, reading.z_ohm)]
+        for along, has, other in ((True, *known), (False, *known[::-1])):
             key = reading.specimen, reading.words.baked, along
-            if ohm:
+            if has:
                 latest[key] = place
                 partner |= dict.fromkeys(waiting.pop(key, ()), place)
             elif other and key in latest:

@@ -72,7 +72,8 @@ def fit(
     step("recordings")
     measured = list(_measured(log, (iteration, specimens), comparison, bench or Bench(), body_of, left_out))
     allowing = list({row.reading.specimen: (row, reading) for row, reading in _allowing(comparison)}.values())
-    data = _FitData([(row.reading.specimen, reading) for row, reading in allowing if usable(row)], measured)
+    unsound = frozenset(row.reading.specimen for row, _ in allowing if not usable(row))
+    data = _FitData([(row.reading.specimen, reading) for row, reading in allowing if usable(row)], measured, unsound)
     names = sorted(data.specimens())
     if not names:
         of = ", ".join(specimens) or f"iteration {iteration}"
@@ -103,10 +104,13 @@ class _FitData:
         The last reading along the electrodes of each specimen where these are sound.
     measured : sequence of (SpecimenEntries, str)
         Specimens that the bench or an LCR meter has measured, each with the name of its print.
+    unsound : frozenset of str
+        Specimens whose last reading along the electrodes is not of sound ones.
     """
 
     readings: Sequence[tuple[str, AllowedValues]]
     measured: Sequence[tuple[SpecimenEntries, str]]
+    unsound: frozenset[str]
 
     def specimens(self) -> set[str]:
         """All specimens."""
@@ -115,7 +119,8 @@ class _FitData:
     def of(self, specimens: Container[str]) -> "_FitData":
         """Data of some specimens."""
         readings = [each for each in self.readings if each[0] in specimens]
-        return _FitData(readings, [each for each in self.measured if each[0].specimen in specimens])
+        measured = [each for each in self.measured if each[0].specimen in specimens]
+        return _FitData(readings, measured, self.unsound)
 
 
 def _groups(allowing: Sequence[tuple[Compared, AllowedValues]]) -> dict[str, list[tuple[AllowedValues, bool]]]:
@@ -171,10 +176,11 @@ def _fitted(
         for one, print_ in data.measured
     ]
     electrode, film = design.slot("top_electrode")[0].name, design.slot("film")[0].name
-    readings, by_ac = dict(data.readings), estimates.along(fits)  # AC readings of one specimen tell, as the bench's do
+    readings = dict(data.readings)
+    by_ac = {name: one for name, one in estimates.along(fits).items() if name not in data.unsound}
     results = [
         estimates.resistivity([*(readings | by_ac).values()], electrode, 1 if by_ac else estimates.LEAST),
-        estimates.leak([*readings.values()], film, seed),
+        *([estimates.leak([*readings.values()], film, seed)] if readings else []),
         *estimates.values(fits),
     ]
     best = dict[tuple[str, str], Fitted]()
@@ -203,7 +209,7 @@ def _reading_errors(data: _FitData, comparison: Comparison, values: Sequence[Fit
     specimens = dict(data.readings)
     for row in comparison.rows:
         of = row.predicted
-        if of is None or row.reading.specimen not in specimens or not usable(row):
+        if of is None or row.reading.specimen not in specimens or not (row.evidence.ry_ohm and usable(row)):
             continue
         if of.design not in after:  # of all quantities its resistance alone is compared
             body = with_values(comparison.bodies[of.design], values)

@@ -212,7 +212,7 @@ def resistivity(specimens: Sequence[AllowedValues], material: str, least: int = 
         return Untold(f"{RESISTIVITY} along", f"{_specimens(count)} with sound electrodes; expected {least} or more")
     low, high = np.array([(one.low, one.high) for one in specimens]).T
     at = (low + high) / 2
-    prints = by_key((one.print or str(k), at[k]) for k, one in enumerate(specimens))
+    prints = by_key((one.print or k, at[k]) for k, one in enumerate(specimens))
     means = np.array([np.mean(of) for of in prints.values()])
     within = sum(float(((of - np.mean(of)) ** 2).sum()) for of in prints.values()) / count
     between = float(np.var(means, ddof=1)) if len(means) >= LEAST else _OF_PRINTS[0] ** 2

@@ -38,13 +38,11 @@ def rows(given: Sequence[Sequence[str]], estimates: Estimates, *, prior: bool = 
 
 def _numbers(batch: Estimates, prior: bool) -> np.ndarray[Any, np.dtype[np.float64]]:
     """All columns but the last two; nan is a blank."""
-    counts = np.array([[s.force_counts, s.position_counts] for s in Status])[batch.status]
-    counts |= (prior & (batch.status <= Status.NOT_IDENTIFIABLE))[:, None]
-    force, position = np.where(counts, 1.0, np.nan).T
+    batch = batch.identified(prior=prior)
     error, error_m = np.sqrt(batch.covariance[:, _DIAGONAL, _DIAGONAL]).T
     columns = [
-        batch.force_n * force, batch.position_m * position * _MM, error, error_m * _MM,
-        batch.covariance[:, 0, 1] * _MM, *batch.force_90_n.T * force, *batch.position_90_m.T * position * _MM,
+        batch.force_n, batch.position_m * _MM, error, error_m * _MM,
+        batch.covariance[:, 0, 1] * _MM, *batch.force_90_n.T, *batch.position_90_m.T * _MM,
         batch.other_force_n, batch.other_position_m * _MM, batch.chi2,
     ]  # fmt: skip
     numbers = np.stack(columns, -1)

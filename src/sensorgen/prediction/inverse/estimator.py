@@ -242,6 +242,16 @@ class Estimates(PressAnswers):
         """Status of each reading, in words."""
         return Status.in_words(self.status)
 
+    def identified(self, *, prior: bool = False) -> "Estimates":
+        """Estimates that are nan where the readings do not identify a quantity, unless a prior was stated."""
+        counts = np.array([[s.force_counts, s.position_counts] for s in Status])[self.status]
+        counts |= (prior & (self.status <= Status.NOT_IDENTIFIABLE))[:, None]
+        force, position = np.where(counts, 1.0, np.nan).T[:, :, None]
+        return replace(
+            self, force_n=self.force_n * force[:, 0], position_m=self.position_m * position[:, 0],
+            force_90_n=self.force_90_n * force, position_90_m=self.position_90_m * position,
+        )  # fmt: skip
+
 
 class Estimator:
     """Weighted least squares over all frequencies, prepared for one sensor.
