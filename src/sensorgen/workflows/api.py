@@ -15,6 +15,7 @@ from sensorgen.analysis.fit import fit as fit_values
 from sensorgen.analysis.fit.estimates import Fit
 from sensorgen.checks.review import Review
 from sensorgen.core import files
+from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design import design as designs
 from sensorgen.design.body import Body
@@ -419,17 +420,7 @@ def invert(
         )
     f, z = np.atleast_1d(np.asarray(frequency_hz, float)), np.asarray(impedance_ohm, complex)
     at_rest = np.atleast_2d(np.asarray(rest_ohm, complex))
-    if z.ndim != 2 or z.shape[1] != len(f):
-        raise BadInput(f"impedance_ohm of shape {z.shape}; expected (n, {len(f)}), a column for each frequency")
-    if noise is not None and not 0 < noise <= 1:
-        raise BadInput(f"noise={noise!r:.20}; expected a number above 0, up to 1")
-    if perfect and at_rest.size:
-        raise BadInput("rest_ohm beside perfect=True, which needs no reading at rest; expected one of them")
-    if not perfect and (at_rest.shape[1:] != f.shape or not len(at_rest)):
-        raise BadInput(
-            f"rest_ohm of shape {np.shape(rest_ohm)}; expected readings with nothing on the sensor, a column for each "
-            f"of the {len(f)} frequencies (or perfect=True, as if the sensor were as predicted)"
-        )
+    _check_readings(z, at_rest, len(f), noise, perfect=perfect)
     model, _ = sensor_model(_body(what))
     if perfect:
         return Estimator(model.sensor, tuple(f.tolist()), NOISE if noise is None else noise).batch(z).identified()
@@ -440,6 +431,21 @@ def invert(
     presses = by.batch(np.log(np.where(z == 0, np.nan, z) / mean))
     inversion.doubt_rest(presses, np.zeros(len(z), bool), 0)
     return presses
+
+
+def _check_readings(z: Complex, at_rest: Complex, tones: int, noise: float | None, *, perfect: bool) -> None:
+    """Refuse readings of other shapes, and a noise that is none."""
+    if z.ndim != 2 or z.shape[1] != tones:
+        raise BadInput(f"impedance_ohm of shape {z.shape}; expected (n, {tones}), a column for each frequency")
+    if noise is not None and not 0 < noise <= 1:
+        raise BadInput(f"noise={noise!r:.20}; expected a number above 0, up to 1")
+    if perfect and at_rest.size:
+        raise BadInput("rest_ohm beside perfect=True, which needs no reading at rest; expected one of them")
+    if not perfect and (at_rest.shape[1:] != (tones,) or not len(at_rest)):
+        raise BadInput(
+            f"rest_ohm of shape {at_rest.shape}; expected readings with nothing on the sensor, a column for each of "
+            f"the {tones} frequencies (or perfect=True, as if the sensor were as predicted)"
+        )
 
 
 def calibrate(log: Log, *specimens: str, bench: Bench | None = None) -> list[Calibration]:

@@ -176,8 +176,7 @@ def _fitted(
         for one, print_ in data.measured
     ]
     electrode, film = design.slot("top_electrode")[0].name, design.slot("film")[0].name
-    readings = dict(data.readings)
-    by_ac = {name: one for name, one in estimates.along(fits).items() if name not in data.unsound}
+    readings, by_ac = dict(data.readings), estimates.along(fits, data.unsound)
     results = [
         estimates.resistivity([*(readings | by_ac).values()], electrode, 1 if by_ac else estimates.LEAST),
         *([estimates.leak([*readings.values()], film, seed)] if readings else []),

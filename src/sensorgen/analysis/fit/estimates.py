@@ -5,7 +5,7 @@ counts. A result holds values with their uncertainty, what the data do not deter
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from math import exp, inf, isnan, log, pi, sqrt
@@ -227,12 +227,12 @@ def resistivity(specimens: Sequence[AllowedValues], material: str, least: int = 
     )  # fmt: skip
 
 
-def along(fits: "Sequence[OfSpecimen]") -> dict[str, AllowedValues]:
-    """Resistivities along electrodes that AC readings allow, by specimen."""
+def along(fits: "Sequence[OfSpecimen]", unsound: Container[str]) -> dict[str, AllowedValues]:
+    """Resistivities along electrodes that AC readings allow, by specimen, without those of unsound electrodes."""
     known = (
         (fit, at + log(fit.of.model.sensor.common_resistivity_ohm_m()), _SURE * error)
-        for fit, at, error in _sure(fits, "resistivity")
-    )
+        for fit, at, error in _sure(fits, "resistivity") if fit.name not in unsound
+    )  # fmt: skip
     return {fit.name: AllowedValues(at - reach, at + reach, print=fit.print_) for fit, at, reach in known}
 
 
