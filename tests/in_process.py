@@ -12,7 +12,7 @@ from sensorgen.cli import main
 
 @dataclass(frozen=True)
 class Said:
-    """What a command left behind: exit code, and what it wrote where."""
+    """Exit code of a command, and its output and errors."""
 
     code: int
     out: str
@@ -33,7 +33,7 @@ class Said:
 
 
 def captured(capfd, monkeypatch, *words) -> Said:
-    """What a command left behind, by the descriptors: of libraries and of processes that it started, too."""
+    """Result of a command, by the descriptors: of libraries and of processes that it started, too."""
     monkeypatch.setattr(sys, "argv", ["sensorgen", *map(str, words)])
     capfd.readouterr()
     with pytest.raises(SystemExit) as left:

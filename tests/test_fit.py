@@ -95,7 +95,7 @@ def test_specimens_of_one_plate_do_not_tell_how_prints_differ():
 
 
 def test_ac_readings_of_a_dry_joint_are_no_resistivity(tmp_path):
-    """Its multimeter reads 25 times what the others do."""
+    """Multimeter: 25 times what the other specimens have."""
     names = [f"60 SX60 {k}" for k in range(2, 7)]
     rows = [
         notes.reading(name, ohm, "OL")
