@@ -20,6 +20,7 @@ from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.findings import runs
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.results import GcodeFinding
+from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import LayerRegions, Region, drawn, narrow_mm, parts
 
 PITCH_MM = 0.1
@@ -216,20 +217,29 @@ def _cover(regions: Sequence[Region], shape: tuple[int, ...]) -> Real:
 
 def _mean(of: Real, window_mm: float) -> Real:
     """Mean in a square window around each cell."""
-    from scipy import ndimage
+    cells = max(round(window_mm / PITCH_MM), 3)
+    return _sum(of, cells) / cells**2
 
-    return np.asarray(ndimage.uniform_filter(of, max(round(window_mm / PITCH_MM), 3), mode="constant"))
+
+def _sum(of: Real | Mask, cells: int) -> Real:
+    """Sum in a square window of some cells around each, of nothing outside: loading scipy.ndimage costs more than it."""
+    sums: Real = np.asarray(of)
+    for _ in range(2):
+        sums = np.pad(sums, ((cells // 2 + 1, cells - 1 - cells // 2), (0, 0))).cumsum(0, np.float64)
+        sums = (sums[cells:] - sums[:-cells]).T
+    return sums
 
 
 def _largest(wrong: Mask, least_mm2: float = 0.0) -> tuple[float, tuple[float, float]]:
     """Area of the largest connected place [mm2], and its middle from the corner of the piece [mm]; 0 up to a least."""
-    from scipy import ndimage
-
     if np.count_nonzero(wrong) * PITCH_MM**2 <= least_mm2:
         return 0.0, (0.0, 0.0)
-    label, _ = ndimage.label(wrong)
-    areas = np.bincount(label.ravel())[1:]
-    x, y = ((np.array(ndimage.center_of_mass(label == areas.argmax() + 1)) + 0.5 - _MARGIN) * PITCH_MM).tolist()
+    cell = np.cumsum(wrong).reshape(wrong.shape) - 1
+    right, up = wrong[:-1] & wrong[1:], wrong[:, :-1] & wrong[:, 1:]
+    pairs = np.concatenate([(cell[:-1][right], cell[1:][right]), (cell[:, :-1][up], cell[:, 1:][up])], axis=1)
+    place = groups(np.count_nonzero(wrong), *pairs)
+    areas = np.bincount(place)
+    x, y = ((np.argwhere(wrong)[place == areas.argmax()].mean(0) + 0.5 - _MARGIN) * PITCH_MM).tolist()
     return float(areas.max()) * PITCH_MM**2, (round(x, 2), round(y, 2))
 
 
@@ -241,10 +251,9 @@ def _line_at(lines: Beads, at_mm: tuple[float, float]) -> int:
     return int(lines.number[off.argmin()])
 
 
-def _inside(of: Mask, by_mm: float) -> Mask:
-    from scipy import ndimage
-
-    return np.asarray(ndimage.minimum_filter(of, 2 * round(by_mm / PITCH_MM) + 1, mode="constant"))
+def _near(of: Mask, by_mm: float) -> Mask:
+    """Cells with a marked one within a distance, along x and y."""
+    return _sum(of, 2 * round(by_mm / PITCH_MM) + 1) > 0.5
 
 
 def _sparse(design: Design) -> float:
@@ -258,7 +267,7 @@ def _holes(design: Design, raster: LayerRaster) -> Iterator[Disagreement]:
     if _sparse(design) < 1:
         return
     plan = sum(reduce(np.minimum, each) for each in raster.drawn.values())
-    open_ = _inside(np.asarray(plan) > 1 - _OPEN / 4, 0.8 * line) & (raster.smoothed < _OPEN)
+    open_ = ~_near(np.asarray(plan) <= 1 - _OPEN / 4, 0.8 * line) & (raster.smoothed < _OPEN)
     area, at = _largest(open_, _HOLE_LINES * line**2)
     if area > _HOLE_LINES * line**2:
         size = area + line * np.sqrt(area)  # the window leaves half a line at each side out
@@ -277,12 +286,10 @@ def _piles(design: Design, raster: LayerRaster) -> Iterator[Disagreement]:
 
 def _foreign(design: Design, raster: LayerRaster) -> Iterator[Disagreement]:
     """Material further than a line from where its tool's material is drawn."""
-    from scipy import ndimage
-
     line = design.machine.line_mm()
     for tool, printed in raster.printed.items():
-        near = ndimage.maximum_filter(reduce(np.maximum, raster.drawn[tool]), 2 * round(line / PITCH_MM) + 1)
-        stray = np.where(near < _OPEN / 4, printed, 0.0)
+        near = _near(reduce(np.maximum, raster.drawn[tool]) >= _OPEN / 4, line)
+        stray = np.where(near, 0.0, printed)
         area = float(stray.sum()) * PITCH_MM**2
         if area > _FOREIGN_LINES * line**2:
             _, at = _largest(stray > 0)
