@@ -106,6 +106,20 @@ def test_a_curve_ends_where_the_capacitance_is_no_longer_known(monkeypatch):
     assert law.doubts == ("the solution of the cell ended at 5 kPa",)
 
 
+def test_tops_are_those_of_a_cell_that_they_press_also_where_gaps_close_under_one_alone(monkeypatch):
+    """Under an even pressure the thin electrode of a long period reaches the tips at 50 kPa; under a plate it does not."""
+    pytest.importorskip("netgen", reason="solves a cell: pip install sensorgen[fem]")
+    from sensorgen.prediction import compression_law as celllaw
+
+    monkeypatch.setattr(celllaw, "STRESS_PA", (0.0, 1e4, 2e4, 3e4, 4e4, 5e4))
+    sizes = {"period_mm": 5.0, "electrode_mm": 0.06, "lower_height_mm": 0.06, "hang_height_mm": 0.3, "tip_mm": 0.5}
+    cell = make({"shape": "tri", "quality": "extrafine", "parameters": sizes | {"dielectric_mm": 0.12}})
+    stiff, even = (law_of(cell, GAPS, "solved", tip=Tip(block=block)) for block in ("stiff", "even"))
+    rises = [np.array(law.ratio[1:]) - 1 for law in (stiff.tops["even"], even.compression)]
+    assert rises[0] == pytest.approx(rises[1], rel=0.02)
+    assert rises[0][-1] / rises[0][0] > 10  # it bends
+
+
 def test_an_unknown_cell_is_solved_once(monkeypatch):
     """A period that is 10 nm off the prototype's is another cell, with the stored curve: to the 0.6 % that it claims.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import sha256
 from json import dumps
-from math import ceil, log
+from math import ceil, isfinite, log
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,6 +46,7 @@ _SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cel
 _ENOUGH = 0.5  # of the last of them: a curve that is known so far is extended [-]
 _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 0.2 mm from 0.5 kPa on
 _NONE = 1e-6  # share of a rise that stands for none: curves rise [-]
+_ALIKE = 1.05  # ratio of rises under two tops at some pressures over that at others, which serves for all [-]
 _LIKE = {"press2d": "tri", "press3d": "rect", "press_round": "tri"}  # prototypes that other cells should resemble
 
 
@@ -534,7 +535,10 @@ def under_tops(
     design: Design, piece: PressedPiece, model: str, tip: Tip, own: CapacitanceCurve,
     boundary: "BoundaryConditions | None" = None,
 ) -> dict[str, CapacitanceCurve]:  # fmt: skip
-    """Curves under an even pressure and a stiff plate, by the ratio of rises on the coarsest mesh.
+    """Curves under an even pressure and a stiff plate, by the ratio of rises on a coarse mesh.
+
+    Where it changes with the pressure, as gaps close under one top before they do under another, the ratio is solved
+    at every pressure of ``own``, on a finer mesh: at 10 kPa it may be half of that at 25 kPa.
 
     Parameters
     ----------
@@ -543,27 +547,29 @@ def under_tops(
     own : CapacitanceCurve
         Under the tip.
     """
-    loads, level = [own.stress_pa[-1] * share for share in mesh_ladder.COARSE], mesh_ladder.coarsest(model)
 
-    def rise(block: str) -> Real:
+    def rises(block: str, loads: Sequence[float], level: int) -> dict[float, float]:
         try:
             solution = pressed(case_of(design, piece, model, replace(tip, block=block), boundary), loads, level).sound()
         except SensorgenError:
-            return np.zeros(0)
+            return {}
         values = np.array([c.middle() if c else np.nan for c in solution.capacitance_f_per_m2])
-        rises: Real = values[1:] - values[0]
-        return rises
+        return dict(zip(solution.stress_pa[1:].tolist(), (values[1:] - values[0]).tolist(), strict=True))
 
-    reference, curves = rise(tip.block), {tip.block: own} if not tip.soft else {}
+    few, coarsest = [own.stress_pa[-1] * share for share in mesh_ladder.COARSE], mesh_ladder.coarsest(model)
+    curves = {tip.block: own} if not tip.soft else {}
     for block in {EVEN, STIFF} - {tip.block}:
-        under = rise(block)
-        n = min(len(reference), len(under))
-        if n and np.isfinite(ratio := under[:n] / reference[:n]).all():
-            known = [p for p in own.stress_pa if p <= loads[n]]
-            rises = (np.array(own.ratio[: len(known)]) - 1) * np.interp(known, loads[1 : n + 1], ratio)
-            end = 1 + int(np.argmin(np.append(np.diff(rises) > 0, False)))  # a coarse mesh may fall after a contact
+        for loads, level in ((few, coarsest), (own.stress_pa, max(coarsest, mesh_ladder.USUAL - 1))):
+            reference, under = (rises(each, loads, level) for each in (tip.block, block))
+            ratio = {p: rise / reference[p] for p, rise in under.items() if isfinite(rise) and reference.get(p, 0) > 0}
+            if len(ratio) == len(few) - 1 and max(ratio.values()) < _ALIKE * min(ratio.values()):
+                break
+        if ratio:
+            known = [p for p in own.stress_pa if p <= max(ratio)]
+            rise = (np.array(own.ratio[: len(known)]) - 1) * np.interp(known, list(ratio), list(ratio.values()))
+            end = 1 + int(np.argmin(np.append(np.diff(rise) > 0, False)))  # a coarse mesh may fall after a contact
             if end > 1:
-                other = compression.curve(own.name, own.source, known[:end], (1 + rises[:end]).tolist())
+                other = compression.curve(own.name, own.source, known[:end], (1 + rise[:end]).tolist())
                 curves[block] = replace(other, within=own.within)
     return curves
 
