@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.units import M_PER_MM
@@ -46,6 +45,7 @@ _SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cel
 _ENOUGH = 0.5  # of the last of them: a curve that is known so far is extended [-]
 _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 0.2 mm from 0.5 kPa on
 _NONE = 1e-6  # share of a rise that stands for none: curves rise [-]
+_FEW = (0.0, 0.4, 0.8, 1.0)  # pressures at which ways to print are told apart, over the last one [-]
 _ALIKE = 1.05  # ratio of rises under two tops at some pressures over that at others, which serves for all [-]
 _LIKE = {"press2d": "tri", "press3d": "rect", "press_round": "tri"}  # prototypes that other cells should resemble
 
@@ -537,8 +537,8 @@ def under_tops(
 ) -> dict[str, CapacitanceCurve]:  # fmt: skip
     """Curves under an even pressure and a stiff plate, by the ratio of rises on a coarse mesh.
 
-    Where it changes with the pressure, as gaps close under one top before they do under another, the ratio is solved
-    at every pressure of ``own``, on a finer mesh: at 10 kPa it may be half of that at 25 kPa.
+    Where a quarter of the last pressure has another one, as gaps close under one top before they do under another, it
+    is solved at every pressure of ``own``: at 10 kPa it may be half of that at 25 kPa.
 
     Parameters
     ----------
@@ -548,7 +548,7 @@ def under_tops(
         Under the tip.
     """
 
-    def rises(block: str, loads: Sequence[float], level: int) -> dict[float, float]:
+    def rises(block: str, loads: Sequence[float]) -> dict[float, float]:
         try:
             solution = pressed(case_of(design, piece, model, replace(tip, block=block), boundary), loads, level).sound()
         except SensorgenError:
@@ -556,13 +556,13 @@ def under_tops(
         values = np.array([c.middle() if c else np.nan for c in solution.capacitance_f_per_m2])
         return dict(zip(solution.stress_pa[1:].tolist(), (values[1:] - values[0]).tolist(), strict=True))
 
-    few, coarsest = [own.stress_pa[-1] * share for share in mesh_ladder.COARSE], mesh_ladder.coarsest(model)
+    few, level = mesh_ladder.few(own.stress_pa), max(mesh_ladder.coarsest(model), mesh_ladder.USUAL - 1)
     curves = {tip.block: own} if not tip.soft else {}
     for block in {EVEN, STIFF} - {tip.block}:
-        for loads, level in ((few, coarsest), (own.stress_pa, max(coarsest, mesh_ladder.USUAL - 1))):
-            reference, under = (rises(each, loads, level) for each in (tip.block, block))
+        for some, loads in ((few, sorted({*few[:2], few[-1]})), (own.stress_pa, own.stress_pa)):
+            reference, under = rises(tip.block, some), rises(block, loads)
             ratio = {p: rise / reference[p] for p, rise in under.items() if isfinite(rise) and reference.get(p, 0) > 0}
-            if len(ratio) == len(few) - 1 and max(ratio.values()) < _ALIKE * min(ratio.values()):
+            if len(ratio) == len(loads) - 1 and max(ratio.values()) < _ALIKE * min(ratio.values()):
                 break
         if ratio:
             known = [p for p in own.stress_pa if p <= max(ratio)]
@@ -572,14 +572,6 @@ def under_tops(
                 other = compression.curve(own.name, own.source, known[:end], (1 + rise[:end]).tolist())
                 curves[block] = replace(other, within=own.within)
     return curves
-
-
-def _few_pa(stress_pa: float, tip: Tip) -> Real:
-    """A few pressures up to beyond one, where it is among those of :func:`under_tops` these [Pa]."""
-    last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
-    usual = stresses_pa(stress_pa)[-1] * np.array(mesh_ladder.COARSE)
-    is_usual = stress_pa <= last_pa and not tip.soft and stress_pa in usual
-    return usual if is_usual else last_pa * np.array([0.0, 0.4, 0.8, 1.0])
 
 
 def at_a_few_pressures(
@@ -599,7 +591,7 @@ def at_a_few_pressures(
     stress_pa : float
         Up to which it is wanted [Pa].
     tip : Tip
-        What presses; an even pressure or a stiff plate at the pressures of :func:`under_tops`, where it is one of them.
+        What presses.
     level : int
         Of the mesh.
 
@@ -621,7 +613,8 @@ def at_a_few_pressures(
         return law if law.bounded else None
     try:
         case = case_of(design, printed, model, tip)
-        solution = pressed(case, _few_pa(stress_pa, tip).tolist(), level)
+        last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
+        solution = pressed(case, [last_pa * share for share in _FEW], level)
         curve = curve_of(solution)
     except SensorgenError:
         return None

@@ -299,7 +299,7 @@ def estimated(
     return (_limit if case.model == "press3d" else _errors)(case, fine, coarse, level)
 
 
-def _few(stress_pa: Sequence[float]) -> list[float]:
+def few(stress_pa: Sequence[float]) -> list[float]:
     """Those of some pressures, rising from 0, that are nearest to ``COARSE`` [Pa]."""
     loads = np.asarray(stress_pa)
     return [float(loads[k]) for k in sorted({int(abs(loads - share * loads[-1]).argmin()) for share in COARSE})]
@@ -312,7 +312,7 @@ def _smooth(
 
     None where faces touch, or the curve bends too much for that.
     """
-    loads = _few(stress_pa)
+    loads = few(stress_pa)
     if not len(COARSE) == len(loads) < len(stress_pa) or not _may_be_smooth(case, level):
         return None
     coarse = pressed(case, loads, level - 1, keep=keep)
@@ -353,7 +353,7 @@ def _coarser(case: Case, fine: "Pressed", stress_pa: Sequence[float], level: int
     """Solution on the next coarser mesh at some pressures of a finer one; unloaded where there is no such mesh."""
     if len(fine.stress_pa) == 1 or _size(case.model, level - 1) == inf:
         return fine.first(1)
-    some = _few(fine.stress_pa.tolist())
+    some = few(fine.stress_pa.tolist())
     with suppress(cached.Unknown), cached.only_known():
         if keep:  # the level before was not accurate enough: it is stored
             known = pressed(case, stress_pa, level - 1).sound()
