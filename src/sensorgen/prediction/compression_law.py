@@ -9,16 +9,17 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import sha256
 from json import dumps
-from math import ceil, isfinite, log
+from math import ceil, log
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.design.tip import EVEN, STIFF, Tip
+from sensorgen.design.tip import EVEN, STIFF, TOPS, Tip
 from sensorgen.design.values import MaterialValue, film, material_value, of_all_materials, permittivities
 from sensorgen.models import compression
 from sensorgen.models.compression import CapacitanceCurve, Compression, curve_of, extended
@@ -471,7 +472,7 @@ def solved(
     short = curve.stress_pa[-1] < loads[-1]
     ended = [f"the solution of the cell ended at {curve.stress_pa[-1] / 1e3:.3g} kPa"] if short else []
     doubts = (*solution.doubts, *([_LANDING] if solution.fall_m else []), *ended)
-    tops = {} if boundary else under_tops(design, piece, model, tip, curve)
+    tops = {} if boundary else under_tops(design, piece, model, tip, curve, level=level)
     law = _cell(replace(curve, doubts=doubts), {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, tops)
     at_rest = solution.capacitance_f_per_m2[0]
     return _further(law, replace(curve, doubts=doubts), tops, replace(case, piece=piece), until_pa, at_rest)
@@ -533,9 +534,9 @@ def _as_far(top: CapacitanceCurve, own: CapacitanceCurve) -> CapacitanceCurve:
 
 def under_tops(
     design: Design, piece: PressedPiece, model: str, tip: Tip, own: CapacitanceCurve,
-    boundary: "BoundaryConditions | None" = None,
+    boundary: "BoundaryConditions | None" = None, level: int = mesh_ladder.USUAL,
 ) -> dict[str, CapacitanceCurve]:  # fmt: skip
-    """Curves under an even pressure and a stiff plate, by the ratio of rises on a coarse mesh.
+    """Curves under an even pressure and a stiff plate, by the ratio of rises on the next coarser mesh.
 
     Where a quarter of the last pressure has another one, as gaps close under one top before they do under another, it
     is solved at every pressure of ``own``: at 10 kPa it may be half of that at 25 kPa.
@@ -546,30 +547,36 @@ def under_tops(
         As of :func:`case_of`.
     own : CapacitanceCurve
         Under the tip.
+    level : int
+        Of its mesh.
     """
+    stress, rise = np.array(own.stress_pa), np.array(own.ratio) - 1
+    level = max(mesh_ladder.coarsest(model), level - 1)
 
-    def rises(block: str, loads: Sequence[float]) -> dict[float, float]:
+    def over_own(block: str, loads: Sequence[float]) -> tuple[Real, Real]:
+        """Pressures (n,) [Pa], and rises on the coarse mesh over those of ``own`` [-]; none where it is not solved."""
         try:
             solution = pressed(case_of(design, piece, model, replace(tip, block=block), boundary), loads, level).sound()
         except SensorgenError:
-            return {}
-        values = np.array([c.middle() if c else np.nan for c in solution.capacitance_f_per_m2])
-        return dict(zip(solution.stress_pa[1:].tolist(), (values[1:] - values[0]).tolist(), strict=True))
+            return np.zeros(0), np.zeros(0)
+        c = np.array([c.middle() if c else np.nan for c in solution.capacitance_f_per_m2])
+        ratio = (c[1:] / c[0] - 1) / rise[np.searchsorted(stress, solution.stress_pa[1:])]
+        return solution.stress_pa[1:][np.isfinite(ratio)], ratio[np.isfinite(ratio)]
 
-    few, level = mesh_ladder.few(own.stress_pa), max(mesh_ladder.coarsest(model), mesh_ladder.USUAL - 1)
-    curves = {tip.block: own} if not tip.soft else {}
-    for block in {EVEN, STIFF} - {tip.block}:
-        for some, loads in ((few, sorted({*few[:2], few[-1]})), (own.stress_pa, own.stress_pa)):
-            reference, under = rises(tip.block, some), rises(block, loads)
-            ratio = {p: rise / reference[p] for p, rise in under.items() if isfinite(rise) and reference.get(p, 0) > 0}
-            if len(ratio) == len(loads) - 1 and max(ratio.values()) < _ALIKE * min(ratio.values()):
+    few, curves = mesh_ladder.few(own.stress_pa), {tip.block: own} if not tip.soft else {}
+    of_mesh = over_own(tip.block, few)
+    for block in [top for top in TOPS if top != tip.block] if of_mesh[0].size else ():
+        for loads in (sorted({*few[:2], few[-1]}), own.stress_pa):
+            at, ratio = over_own(block, loads)
+            ratio = ratio / np.interp(at, *of_mesh)
+            if len(at) == len(loads) - 1 and ratio.max() < _ALIKE * ratio.min():
                 break
-        if ratio:
-            known = [p for p in own.stress_pa if p <= max(ratio)]
-            rise = (np.array(own.ratio[: len(known)]) - 1) * np.interp(known, list(ratio), list(ratio.values()))
-            end = 1 + int(np.argmin(np.append(np.diff(rise) > 0, False)))  # a coarse mesh may fall after a contact
+        if at.size:
+            known = stress[stress <= at.max()]
+            rises = rise[: len(known)] * np.interp(known, at, ratio)
+            end = 1 + int(np.argmin(np.append(np.diff(rises) > 0, False)))  # a coarse mesh may fall after a contact
             if end > 1:
-                other = compression.curve(own.name, own.source, known[:end], (1 + rise[:end]).tolist())
+                other = compression.curve(own.name, own.source, known[:end].tolist(), (1 + rises[:end]).tolist())
                 curves[block] = replace(other, within=own.within)
     return curves
 
