@@ -48,6 +48,12 @@ FIRM = {"film": "x60@thesis-4.1", "dielectric": "x60@thesis-4.1"}  # another mod
         ("tri", {"materials": FIRM}),
         ("tri", {"material_values": {"x60": {"poisson_ratio": 0.45}}}),
         ("tri", {"material_values": {"etpu": {"poisson_ratio": 0.3}}}),
+        ("tri", {"material_values": {"x60": {"relative_permittivity": 6.33}}}),
+        ("rect", {"material_values": {"x60": {"relative_permittivity": 6.33}}}),
+        ("tri", {"materials": {"film": "ninjaflex"}, "tools": {"ninjaflex": 1}}),
+        ("tri", {"parameters": {"tip_mm": 0.2}}),
+        ("tri", {"parameters": {"electrode_mm": 0.1}}),
+        ("rect", {"parameters": {"angle_deg": 60.0}}),
     ],
 )
 def test_other_cells_are_taken_for_free_plates_and_that_is_said(shape, rest):

@@ -27,9 +27,11 @@ COST = 0
 PROTOTYPE_PA = 6e6  # Young's modulus of the films of the stored cells [Pa]
 BLOCK_PA = 12e6  # the same of the block that stored cells were pressed with: the usual tip's [Pa]
 SOLVED_RATIO = 0.4999  # Poisson's ratio of all materials of the stored cells [-]
+SOLVED_PERMITTIVITY = {"x60": 4.68, "air": 1.00059}  # of the same [-]
+SOLVED_OF = {(True, "etpu"), (False, "x60")}  # their bodies: whether they are electrodes, and of what
 REACH = 3.0  # factor on its last stress up to which a curve is extrapolated by its last slope [-]
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
-_SAME = 1e-6  # relative difference up to which two parameters are one
+_SAME = 1e-6  # difference up to which two parameters are one, relative of moduli
 _STIFF = 1e-3  # decay below which a plate counts as incompressible: 4e-7 of the modulus [-]
 _NODES = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25])  # of an average, over its last pressure
 _BEND = 1e-6  # share of a straight continuation over which a curve takes its slope [-]
@@ -368,14 +370,14 @@ def solved(
     shape : str
         Name of the shape.
     parameters : mapping
-        All its parameters.
+        Its parameters; one that is not given is that of the stored cell.
     youngs_modulus_pa : mapping of str to float
         By material [Pa]. The stress scales with them, as long as their ratio is that of the solved cell.
     """
     for cell in _cells()["cells"]:
         moduli = cell["youngs_modulus_pa"]
         factors = [youngs_modulus_pa.get(name, 0.0) / modulus for name, modulus in moduli.items()]
-        same = all(abs(parameters.get(k, np.inf) / v - 1) < _SAME for k, v in cell["parameters"].items())
+        same = all(abs(parameters.get(k, v) - v) < _SAME for k, v in cell["parameters"].items())
         if cell["shape"] == shape and same and min(factors) > 0 and max(factors) / min(factors) - 1 < _SAME:
             return _curve(cell, factors[0])
     return None

@@ -43,6 +43,7 @@ _HEIGHTS = 2.0  # the same over the cell's height, where no period is known [-]
 _LANDING = f"feet land at negligible force: the rise of C up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
 _STRAIN = np.linspace(0.0, 0.3, 7)  # of infill: lines of its law, which is straight up to there at most
 _SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cell, 0.45 deforms by 11 % more
+_SAME_PERMITTIVITY = 2e-3  # relative difference of permittivities, by which a rise differs by 0.16 % in tri [-]
 _ENOUGH = 0.5  # of the last of them: a curve that is known so far is extended [-]
 _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 0.2 mm from 0.5 kPa on
 _NONE = 1e-6  # share of a rise that stands for none: curves rise [-]
@@ -272,19 +273,27 @@ def infill(design: Design, piece: PressedPiece) -> Law | None:
 def _stored(design: Design, printed: PressedPiece | None) -> CapacitanceCurve | None:
     """The stored curve of this cell as drawn, or as printed as those of the thesis's designs are; else None.
 
-    Those are of materials of one Poisson's ratio.
+    Those are of bodies of given materials, of one Poisson's ratio and given permittivities.
     """
+    if not _is_solved(design):
+        return None
     moduli_pa = {n: t.value for n, t in of_all_materials(design, "youngs_modulus_pa").items()}
     if printed is None:
-        curve = compression.solved(design.shape, vars(design.params), moduli_pa)
-    else:
-        # Estimates; G-code, of which equal slices differ by 4 nm; both as mirror images, as other counts of periods are
-        keys = (content(printed, digits, turned=turned) for turned in (False, True) for digits in (6, 3))
-        curve = next(filter(None, (compression.solved_print(key, moduli_pa) for key in keys)), None)
-    if not curve:
-        return None
-    ratios = (taken.value for taken in of_all_materials(design, "poisson_ratio").values())
-    return curve if all(abs(ratio - compression.SOLVED_RATIO) < _SAME_RATIO for ratio in ratios) else None
+        return compression.solved(design.shape, vars(design.params), moduli_pa)
+    # Estimates; G-code, of which equal slices differ by 4 nm; both as mirror images, as other counts of periods are
+    keys = (content(printed, digits, turned=turned) for turned in (False, True) for digits in (6, 3))
+    return next(filter(None, (compression.solved_print(key, moduli_pa) for key in keys)), None)
+
+
+def _is_solved(design: Design) -> bool:
+    """Test whether bodies, Poisson's ratios and permittivities are those of the stored cells."""
+    if {(bool(b.terminal), b.material) for b in design.in_use.bodies} != compression.SOLVED_OF:
+        return False
+    eps = {t.material: t.value for t in permittivities(design)}
+    ratios = [taken.value for taken in of_all_materials(design, "poisson_ratio").values()]
+    return all(abs(ratio - compression.SOLVED_RATIO) < _SAME_RATIO for ratio in ratios) and all(
+        abs(eps[name] / value - 1) < _SAME_PERMITTIVITY for name, value in compression.SOLVED_PERMITTIVITY.items()
+    )
 
 
 def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> str:
