@@ -11,12 +11,14 @@ import pytest
 
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
-from sensorgen.models import curved, press2d, press3d, press_round
+from sensorgen.design.tip import Tip
+from sensorgen.models import curved, press2d, press3d, press_round, springs
 from sensorgen.models.press_round import BoundaryConditions, Elastic, Fineness
-from sensorgen.prediction.mesh_ladder import limit
+from sensorgen.prediction.compression_law import case_of
+from sensorgen.prediction.mesh_ladder import COARSEST, drawn, limit, pressed
 from sensorgen.scene.polyhedra import Loft
 from sensorgen.scene.revolved import Revolved
-from sensorgen.scene.scene import Body, Scene, box, rectangle
+from sensorgen.scene.scene import Body, Prism, Scene, box, rectangle
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 SOLIDS = {"etpu": Elastic(12e6, 0.45), "x60": Elastic(26e6, 0.45)}
@@ -207,10 +209,25 @@ def test_a_bump_balances_work_and_energy_and_converges_with_its_mesh():
     assert second < first / 2
 
 
+def test_a_block_holds_the_electrode_as_in_3d():
+    """Posts far apart under a block: between an even pressure, 4.8, and a stiff plate, 2.1 nF/m2 (press3d: 2.36)."""
+    sizes = {"cog": "dielectric", "period_mm": 3.0, "side_mm": 1.0, "length_mm": 30.0, "width_mm": 12.0}
+    cell = make({"shape": "pillar", "parameters": sizes | {"electrode_mm": 0.4}})
+    case = case_of(cell, drawn(cell), "press_round", Tip())
+    rest, loaded = (c.middle() for c in pressed(case, [0.0, 5e4], COARSEST).capacitance_f_per_m2)
+    assert loaded - rest == pytest.approx(2.364e-9, rel=0.05)
+
+
 def test_what_has_no_common_axis_is_refused():
     at = Revolved(0.5, 0.6, ((0, 0.1), (0.3, 0.4), (0, 0.4)), (0, 0, 0))
     assert "axis" in press_round.why_not_applicable(over_a_plate(at, 0.2, 1.25))
     long = Loft(rectangle(0.1, 1.15, 0.5, 0.7), rectangle(0.1, 1.15, 0.5, 0.7), 0.1, 0.4)
     assert "square" in press_round.why_not_applicable(over_a_plate(long, 0.2, 1.25))
+    turn = np.linspace(0, 2 * pi, 33)[:-1]
+    outline = tuple(map(tuple, np.round(np.column_stack([10 + 10 * np.cos(turn), 10 + 10 * np.sin(turn)]), 6).tolist()))
+    levels = {"bottom": (0.0, 0.4), "": (0.4, 0.9), "top": (0.9, 1.3)}
+    disc = Scene(tuple(Body(n, "soft", (Prism("z", outline, *z),), n) for n, z in levels.items()), (20.0, 20.0, 1.3))
+    assert "ends before the cell" in press_round.why_not_applicable(disc)
+    assert springs.displacement_m(disc, {"soft": 1e6}, [1e4]) == pytest.approx([1.3e-5])
     with pytest.raises(BadInput, match="axisymmetric"):
         press_round.press(over_a_plate(long, 0.2, 1.25), SOLIDS, [0.0, 1e4])

@@ -5,15 +5,17 @@ from dataclasses import dataclass
 from itertools import chain, pairwise
 
 import numpy as np
+import shapely
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.scene.layers import overlay_parts
-from sensorgen.scene.scene import Scene
+from sensorgen.scene.scene import Piece, Scene, shadow
 from sensorgen.scene.sections import Layer, SectionColumn
 
 SOURCE = "Wiener (1912), Gent & Lindley (1959), Hashin & Shtrikman (1962, 1963), Gibson & Ashby (1997)"
 COST = 0
+_POINTS = 4000  # along all edges of a plan
 
 
 @dataclass(frozen=True)
@@ -28,11 +30,14 @@ class Filling:
         Of the volume that is solid [-].
     modulus_pa : Interval
         Stress on the whole area over the relative change of the gap, at small strain [Pa].
+    bend_per_pa : float
+        At most, how much the upper electrode bends into the air below it, relative to that [1/Pa].
     """
 
     gap_mm: float
     share: float
     modulus_pa: Interval
+    bend_per_pa: float = 0.0
 
     def rise_powers(self, permittivity: float) -> Interval:
         r"""Powers n of :math:`C \propto (1 - e)^{-n}` under a strain e [-].
@@ -58,6 +63,9 @@ def filling(scene: Scene, modulus_pa: Mapping[str, float]) -> Filling | None:
 
     with the columns' shares a of the area, the levels' heights h, the gap d and the width w of a level's widest solid
     (Gent and Lindley, 1959, for s). The lower one is a bound for faces that slide or stick, the upper an estimate.
+    Under a pressure p the upper electrode, E and h thick, bends by at most the mean deflection 2 p r^4 / 15 D,
+    D = E h^3 / 12, of a strip on two edges that are free to turn, r from its middle: no place of it is farther from
+    what stands under it.
 
     Parameters
     ----------
@@ -84,7 +92,35 @@ def filling(scene: Scene, modulus_pa: Mapping[str, float]) -> Filling | None:
     d = gap[1] - gap[0]
     flat = float(1 / (height / (_shape_factors(scene, levels, d) * (area @ moduli))).sum())
     share = float(area @ ((moduli > 0) @ height)) / d
-    return Filling(d, share, Interval(d * standing, d * flat))
+    return Filling(d, share, Interval(d * standing, d * flat), _bend_per_pa(scene, levels, moduli, area, modulus_pa))
+
+
+def _bend_per_pa(
+    scene: Scene, levels: Sequence[float], moduli: Real, area: Real, modulus_pa: Mapping[str, float]
+) -> float:
+    """How much the upper electrode bends over the highest level that has air, as :class:`Filling` has it."""
+    airy = np.flatnonzero((moduli == 0).any(axis=0))
+    if not airy.size:
+        return 0.0
+    middle = (levels[airy[-1]] + levels[airy[-1] + 1]) / 2
+    between = [p for body, p in scene.pieces if not body.terminal and p.span("z")[0] < middle < p.span("z")[1]]
+    top = [(body.material, p) for body, p in scene.pieces if body.terminal == "top"]
+    reach = _farthest_mm([p for _, p in top], between)
+    heights = [z for _, p in top for z in p.span("z")]
+    stiffness = min(modulus_pa[name] for name, _ in top) * (max(heights) - min(heights)) ** 3 / 12
+    open_ = moduli[:, airy[-1]] == 0
+    air = (moduli[open_] == 0) @ np.diff(levels)
+    return float(area[open_] @ (1 / air) / area[open_].sum()) * 2 / 15 * reach**4 / stiffness
+
+
+def _farthest_mm(whole: Sequence[Piece], standing: Sequence[Piece]) -> float:
+    """Largest distance in plan from a place of some pieces to the nearest of others, which are drawn by points [mm]."""
+    plate, *under = (shapely.union_all([shapely.Polygon(shadow(p, "z")) for p in ps]) for ps in (whole, standing))
+    edges = [shapely.segmentize(shapely.boundary(one), shapely.length(one) / _POINTS) for one in (plate, *under)]
+    places = shapely.get_coordinates([edges[0], shapely.voronoi_polygons(edges[1], only_edges=True)])
+    places = places[shapely.intersects_xy(plate, *places.T)]
+    tree = shapely.STRtree(shapely.get_parts(under[0]))
+    return float(tree.query_nearest(shapely.points(places), all_matches=False, return_distance=True)[1].max())
 
 
 def _moduli(

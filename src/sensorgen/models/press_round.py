@@ -16,7 +16,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.models import curved, press2d, refusal
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness, Pressed
 from sensorgen.scene.revolved import Revolved
-from sensorgen.scene.scene import Piece, Point, Scene
+from sensorgen.scene.scene import SLIVER_MM, Piece, Point, Scene
 from sensorgen.solvers.contact.cell import AIR, ContactCell, Region, partition
 from sensorgen.solvers.contact.mesh import grown
 from sensorgen.solvers.electrostatics.bounds import third_conductor
@@ -85,17 +85,26 @@ def cell(scene: Scene, fineness: Fineness = USUAL) -> ContactCell:
         window, _, _ = curved.cell(scene)
     except ValueError as error:
         raise BadInput(f"{_WANTED}: {error}") from None
-    (x0, y0, z0), (x1, y1, z1) = window.low_mm, window.high_mm
+    (x0, y0, z0), (x1, y1, _) = window.low_mm, window.high_mm
+    inner = [p for _, p in scene.pieces if _overlap(p.span("x"), (x0, x1)) and _overlap(p.span("y"), (y0, y1))]
+    z1 = max(p.span("z")[1] for p in inner)  # of isolation and block, too
     why = ""
     for (x, across), (y, along) in product(*([(a, 2), ((a + b) / 2, 1), (b, 2)] for a, b in ((x0, x1), (y0, y1)))):
         plan = _Plan(shapely.box(x0, y0, x1, y1), (x, y), across * along)
         try:
-            whole = _regions(scene, [near for near, _ in window.pieces], plan, fineness)
+            whole = _regions(scene, inner, plan, fineness)
         except BadInput as error:
             why = why or str(error)
             continue
-        return partition(whole, shapely.box(*np.round([0.0, z0, plan.radius_mm(plan.box), z1], _DIGITS)), turned=True)
+        edge_mm = round(plan.radius_mm(plan.box), _DIGITS)
+        if any(edge_mm - shape.bounds[2] > _SAME_MM for region, shape in whole.items() if region.terminal):
+            raise BadInput(f"{_WANTED}: an electrode ends before the cell does")
+        return partition(whole, shapely.box(0.0, round(z0, _DIGITS), edge_mm, round(z1, _DIGITS)), turned=True)
     raise BadInput(f"{_WANTED}: {why}")
+
+
+def _overlap(one: Sequence[float], other: Sequence[float]) -> bool:
+    return min(one[1], other[1]) - max(one[0], other[0]) > SLIVER_MM
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Seq
     except ValueError as error:
         raise BadInput(f"no springs of columns: {error}") from None
     for part in sections_of:
-        for column in part.columns:
+        for column in (c for c in part.columns if c.layers):
             bottoms, tops = (
                 np.array([getattr(layer, key) for layer in column.layers]) @ np.array([1 - share, share])
                 for key in ("bottom_mm", "top_mm")

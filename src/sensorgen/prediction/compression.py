@@ -25,7 +25,16 @@ from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.prediction import capacitance_answer as at_rest
 from sensorgen.prediction import mesh_ladder
 from sensorgen.prediction.capacitance import Answer, Unpredictable, capacitance, is_plate
-from sensorgen.prediction.compression_law import case_of, closed_f_per_m2, elastic, gap_m, infill, law_of, under_tops
+from sensorgen.prediction.compression_law import (
+    case_of,
+    closed_f_per_m2,
+    elastic,
+    gap_m,
+    infill,
+    law_of,
+    like_infill,
+    under_tops,
+)
 from sensorgen.prediction.mesh_ladder import Case, Estimate, PressedPiece, why_not_applicable
 from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_until_within
 from sensorgen.prediction.sensor_model import piece as piece_of
@@ -82,7 +91,7 @@ def law_name(design: Design, piece: PressedPiece) -> str:
         known = _at_rest(design, piece)
         if is_plate(known, piece.scene):
             return "bonded" if _between(piece) == {film(design)} else ""
-        return "infill" if infill(design, piece) else ""
+        return "infill" if like_infill(design, piece) and infill(design, piece) else ""
     except SensorgenError:
         return ""
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sensorgen.checks import estimate
 from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError, UnknownName
@@ -46,6 +47,7 @@ _SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cel
 _SAME_PERMITTIVITY = 2e-3  # relative difference of permittivities, by which a rise differs by 0.16 % in tri [-]
 _ENOUGH = 0.5  # of the last of them: a curve that is known so far is extended [-]
 _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 0.2 mm from 0.5 kPa on
+_BENDS = 10.0  # strain by bending electrodes, at most, over that of what stands, at most: softer is no infill [-]
 _NONE = 1e-6  # share of a rise that stands for none: curves rise [-]
 _FEW = (0.0, 0.4, 0.8, 1.0)  # pressures at which ways to print are told apart, over the last one [-]
 _ALIKE = 1.05  # ratio of rises under two tops at some pressures over that at others, which serves for all [-]
@@ -134,12 +136,12 @@ def law_of(
 
 def _unsolved(design: Design, soft: MaterialValue, name: str, piece: PressedPiece) -> Law:
     """A cell with gaps as infill where it is like that, else as a plate of its soft material, of unknown error."""
-    may = name == "infill" or (name != "unconfined" and piece.period_mm is None)
+    may = name == "infill" or (name != "unconfined" and like_infill(design, piece))
     if may and (by_infill := infill(design, piece)):
         return by_infill
     if name == "infill":
         raise OutOfRange(
-            f"the law 'infill' applies to solids that stand between flat electrodes; {design.shape} has none"
+            f"the law 'infill' applies to solids that stand between electrodes that stay flat; {design.shape} has none"
         )
     doubt = (
         f"{design.shape} approximated by a free solid plate of {soft.material} (B.49): its cell was not solved; "
@@ -242,8 +244,18 @@ def nearest(design: Design, piece: PressedPiece, answer: Answer, until_pa: float
     return replace(law, compression=between, doubts=(*law.doubts, doubt), others=others, of_mesh=others)
 
 
+def like_infill(design: Design, piece: PressedPiece) -> bool:
+    """Test whether the law of infill comes first: lines of sparse infill, or a cell that no solver applies to."""
+    if piece.period_mm is not None:
+        return False
+    sparse = any(lines.infill < 1 for lines in estimate.lines(design).values())
+    return sparse or all(mesh_ladder.why_not_applicable(piece, model) for model in mesh_ladder.MODELS)
+
+
 def infill(design: Design, piece: PressedPiece) -> Law | None:
     """Law of what lies between flat electrodes, as infill does, between bounds of its stiffness; None of other cells.
+
+    The upper electrode may bend over the air; None too where that could be most of what the cell yields.
 
     Parameters
     ----------
@@ -256,7 +268,7 @@ def infill(design: Design, piece: PressedPiece) -> Law | None:
 
     moduli = of_all_materials(design, "youngs_modulus_pa")
     filling = porous.filling(piece.scene, {n: t.value for n, t in moduli.items()})
-    if not filling:
+    if not filling or filling.bend_per_pa * filling.modulus_pa.lower > _BENDS:
         return None
     eps = {t.material: t.value for t in permittivities(design)}
     modulus_pa, power = filling.modulus_pa, filling.rise_powers(eps[film(design)])
@@ -266,7 +278,8 @@ def infill(design: Design, piece: PressedPiece) -> Law | None:
         own = compression.curve("infill", porous.SOURCE, (modulus * _STRAIN).tolist(), ratio.tolist())
         return replace(own, displacement_m=float(_STRAIN[-1]) * filling.gap_mm * M_PER_MM)
 
-    others = law(modulus_pa.lower, power.upper), law(modulus_pa.upper, power.lower)
+    softest = 1 / (1 / modulus_pa.lower + filling.bend_per_pa)
+    others = law(softest, power.upper), law(modulus_pa.upper, power.lower)
     return Law(law(modulus_pa.middle(), power.middle()), tuple(moduli.values()), others=others)
 
 
