@@ -165,3 +165,12 @@ def test_crossed_strips_bridge_the_air_between_the_lower_ones(air, severity):
     found = reviewed(shape="rect", parameters=size | {"air_width_mm": air})
     assert {f.severity for f in found} == ({severity} if severity else set())
     assert all("a bridge" in f.message and f.value_mm == pytest.approx(air) for f in found)
+
+
+@pytest.mark.parametrize("pin", [0.0, 1.0])
+def test_what_support_alone_holds_is_loose(sensor, findings, pin):
+    """A lid over support falls off once that is washed out, unless a pin of 1 mm joins it to what lies below."""
+    lid, support = box(0, 20, 0, 20, 1.4, 1.6), box(0, 20 - pin, 0, 20, 1.2, 1.4)
+    pins = [Body("pin", "x60", (box(20 - pin, 20, 0, 20, 1.2, 1.4),))] if pin else []
+    found = findings(sensor(*pins, Body("support", "bvoh", (support,)), Body("lid", "etpu", (lid,))), "9-loose")
+    assert [(f.severity, f.body, f.layer) for f in found] == [("error", "lid", 15)] * (not pin)

@@ -261,6 +261,15 @@ def test_too_many_conductors_are_asked_for_by_name(run, tmp_path):
     assert "give --terminal low=END --terminal one=END --terminal two=END, END top" in line
 
 
+def test_a_top_that_support_alone_holds_is_no_plate(run, tmp_path):
+    """It passed as a solid plate that prints without findings."""
+    files = stacked(tmp_path, low=(0.0, 0.4), film=(0.4, 0.7), support=(0.7, 0.8), up=(0.8, 1.2))
+    materials = ("--map", "film=x60@1", "--map", "support=bvoh@3", "--map", "*=etpu@2")
+    assert run("import", *files, *materials, "--name", "sup").code == 0
+    assert "9-loose up nothing holds it" in run("check", "sup.yaml", "--budget", "0").words
+    assert "is held by nothing" in run("predict", "sup.yaml", "--drawn").words
+
+
 def test_a_conductor_between_both_electrodes_is_a_short(run, tmp_path):
     """It was called a middle electrode."""
     files = stacked(tmp_path, low=(0.0, 0.4), block=(0.4, 0.6), up=(0.6, 1.0))

@@ -13,7 +13,7 @@ from sensorgen.checks.widths import TOUCH_MM, VANISHES, Slices
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality
-from sensorgen.scene.layers import LayerRegions, Region, cleaned, inside, is_rectilinear, narrow_mm, parts
+from sensorgen.scene.layers import EMPTY, LayerRegions, Region, cleaned, inside, is_rectilinear, narrow_mm, parts
 from sensorgen.scene.scene import SLIVER_MM, Body
 
 
@@ -61,6 +61,34 @@ def _judged(
             "turn the sensor over, or fill the air with support (--support bvoh)",
             round(island.mm, 9), 0.0, layer, (island.x, island.y, z_mm),
         )  # fmt: skip
+
+
+def loose(slices: Slices) -> Iterator[Finding]:
+    """Findings about bodies of which nothing is joined to the first layer once soluble support is washed out."""
+    bodies = [b for b in slices.scene.bodies if not b.is_support()]
+    if len(bodies) == len(slices.scene.bodies):
+        return
+    joined = _joined([shapely.union_all([slices.body(b, k) for b in bodies]) for k in range(len(slices.layers))])
+    for body in bodies:
+        regions = [slices.body(body, k) for k in range(len(joined))]
+        if not any(shapely.intersection(r, j).area > SLIVER_MM**2 for r, j in zip(regions, joined, strict=True)):
+            first = next(k for k, region in enumerate(regions) if not region.is_empty)
+            at = regions[first].centroid
+            yield Finding(
+                "9-loose", "error", body.name, "nothing holds it once the support is washed out",
+                "let a body that stays reach from one to the other", layer=first + 1,
+                place_mm=(round(at.x, 3), round(at.y, 3), slices.layers.mids_mm[first]),
+            )  # fmt: skip
+
+
+def _joined(layers: Sequence[Region]) -> list[Region]:
+    """Parts of each layer that are joined to the first one, from below or from above."""
+    joined, area = [layers[0], *[EMPTY] * (len(layers) - 1)], 0.0
+    while area < (area := sum(region.area for region in joined)):
+        for k in (*range(1, len(layers)), *reversed(range(len(layers) - 1))):
+            plan, beside = shapely.get_parts(layers[k]), shapely.union_all(joined[max(k - 1, 0) : k + 2])
+            joined[k] = shapely.union_all(plan[shapely.area(shapely.intersection(plan, beside)) > SLIVER_MM**2])
+    return joined
 
 
 def _grid(

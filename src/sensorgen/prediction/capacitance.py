@@ -438,11 +438,14 @@ def _of_plain(data: dict[str, Any]) -> Answer:
 
 
 def is_plate(answer: Answer, scene: Scene) -> bool:
-    """True for the capacitance of a solid plate: its cell has no other bounds than itself, and no air in it."""
+    """True for the capacitance of a solid plate: its cell has no other bounds than itself, and no air in it.
+
+    Where nothing stands between the electrodes, all of a layer is air.
+    """
     widths = [c.width for c in answer.plan if c.model == answer.model and c.width is not None]
     if min(widths, default=answer.capacitance_f.width()) >= _EXACT:
         return False
     from sensorgen.models import porous
 
     filling = porous.filling(scene, dict.fromkeys((body.material for body in scene.bodies), 1.0))
-    return filling is None or filling.share > 1 - _SOLID
+    return filling is not None and filling.share > 1 - _SOLID

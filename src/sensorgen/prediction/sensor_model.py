@@ -8,6 +8,7 @@ left of the tolerance.
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from math import inf, isinf
 
 from sensorgen.core.errors import BadInput, OutOfRange
@@ -24,6 +25,7 @@ from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_
 from sensorgen.prediction.query import DEFAULT, FLAT, Load, Query, Tip
 from sensorgen.prediction.reference_load import ReferenceLoad
 from sensorgen.prediction.rest_state import Lost, RestState, lost, rest_state
+from sensorgen.scene.scene import SLIVER_MM
 from sensorgen.scene.sections import square_to
 from sensorgen.scene.slabs import is_open
 
@@ -141,6 +143,10 @@ def _no_line(body: Body, rest: RestState) -> str:
     scene = body.cells.first()
     if set(rest.resistance) != set(ENDS):
         return "an electrode does not run from end to end: the sensor at rest is predicted, not its response"
+    spans = sorted(p.span("z") for _, p in body.design.in_use.pieces)
+    tops = accumulate((high for _, high in spans), max)
+    if any(low - top > SLIVER_MM for (low, _), top in zip(spans[1:], tops, strict=False)):
+        return "what lies above a layer of air is held by nothing: the sensor at rest is predicted, not its response"
     if not is_open(scene):
         return ""
     ends = [replace(scene, bodies=tuple(b for b in scene.bodies if b.terminal == end)) for end in ENDS]
