@@ -266,7 +266,7 @@ def test_a_top_that_support_alone_holds_is_no_plate(run, tmp_path):
     files = stacked(tmp_path, low=(0.0, 0.4), film=(0.4, 0.7), support=(0.7, 0.8), up=(0.8, 1.2))
     materials = ("--map", "film=x60@1", "--map", "support=bvoh@3", "--map", "*=etpu@2")
     assert run("import", *files, *materials, "--name", "sup").code == 0
-    assert "9-loose up nothing holds it" in run("check", "sup.yaml", "--budget", "0").words
+    assert "9-loose up, layer 9 nothing holds it" in run("check", "sup.yaml", "--budget", "0").words
     assert "is held by nothing" in run("predict", "sup.yaml", "--drawn").words
 
 

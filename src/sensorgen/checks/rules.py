@@ -210,8 +210,8 @@ def _printed_gaps(pair: Pair, slices: Slices, printer: Printer) -> dict[float | 
 # Names of all rules; those from 10 on are about the design's file and about the G-code.
 RULES = (
     "0-body", "0-printer", "1-short", "2-film", "2-printed-gap", "3-grid", "4-unsampled", "5-width", "6-gap",
-    "7-printed", "8-bed", "9-bridge", "9-loose", "9-support", "10-film", "10-waiver", "11-crossing", "11-overlap", "11-profile",
-    "11-repaired", "11-size", "11-surface", "12-numbers", "13-gcode",
+    "7-printed", "8-bed", "9-bridge", "9-loose", "9-support", "10-film", "10-waiver", "11-crossing", "11-overlap",
+    "11-profile", "11-repaired", "11-size", "11-surface", "12-numbers", "13-gcode",
 )  # fmt: skip
 
 

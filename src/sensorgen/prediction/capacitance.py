@@ -438,14 +438,14 @@ def _of_plain(data: dict[str, Any]) -> Answer:
 
 
 def is_plate(answer: Answer, scene: Scene) -> bool:
-    """True for the capacitance of a solid plate: its cell has no other bounds than itself, and no air in it.
+    """True of a solid plate, its electrodes flat or with cogs: no air in its cell.
 
-    Where nothing stands between the electrodes, all of a layer is air.
+    Where nothing stands between flat electrodes, all of a layer is air.
     """
-    widths = [c.width for c in answer.plan if c.model == answer.model and c.width is not None]
-    if min(widths, default=answer.capacitance_f.width()) >= _EXACT:
-        return False
     from sensorgen.models import porous
 
+    widths = [c.width for c in answer.plan if c.model == answer.model and c.width is not None]
+    if min(widths, default=answer.capacitance_f.width()) >= _EXACT:
+        return porous.is_solid(scene)
     filling = porous.filling(scene, dict.fromkeys((body.material for body in scene.bodies), 1.0))
     return filling is not None and filling.share > 1 - _SOLID

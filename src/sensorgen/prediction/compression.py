@@ -18,7 +18,7 @@ from sensorgen.core.errors import BadInput, MissingValue, NotInstalled, OutOfRan
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.tip import TOPS, WORDS, Tip
-from sensorgen.design.values import assumed, film, of_all_materials, permittivities
+from sensorgen.design.values import assumed, of_all_materials, permittivities
 from sensorgen.models import press2d, springs
 from sensorgen.models.compression import curve_of
 from sensorgen.models.press2d import BoundaryConditions
@@ -84,13 +84,13 @@ PLATES = {"unconfined": "free", "bonded": "bonded to both electrodes"}
 
 
 def law_name(design: Design, piece: PressedPiece) -> str:
-    """Law in closed form of a plate of one material, or of infill; "" of other cells, which are solved."""
+    """Law in closed form of a solid plate, or of infill; "" of other cells, which are solved."""
     try:
-        if piece.period_mm is not None or len({b.terminal for b in piece.scene.bodies} - {""}) != 2:
+        if len({b.terminal for b in piece.scene.bodies} - {""}) != 2:
             return ""
         known = _at_rest(design, piece)
         if is_plate(known, piece.scene):
-            return "bonded" if _between(piece) == {film(design)} else ""
+            return "bonded"
         return "infill" if like_infill(design, piece) and infill(design, piece) else ""
     except SensorgenError:
         return ""
@@ -101,15 +101,11 @@ def _at_rest(design: Design, piece: PressedPiece) -> Answer:
     return capacitance(piece.scene, eps, model="columns", keep=False)
 
 
-def _between(piece: PressedPiece) -> set[str]:
-    return {body.material for body in piece.scene.bodies if not body.terminal}
-
-
 def _law(name: str, design: Design, piece: PressedPiece, stress_pa: Sequence[float]) -> ClosedForm:
     """A law of solid plates or of infill."""
     known = _at_rest(design, piece)
-    if name in PLATES and (not is_plate(known, piece.scene) or _between(piece) != {film(design)}):
-        raise BadInput(f"--model {name} applies to a solid plate of one material, {design.shape} is none: try springs")
+    if name in PLATES and not is_plate(known, piece.scene):
+        raise BadInput(f"--model {name} applies to a solid plate, {design.shape} is none: try springs")
     mesh_ladder.refuse_crushing(
         stress_pa[-1], {n: taken.value for n, taken in of_all_materials(design, "youngs_modulus_pa").items()}
     )

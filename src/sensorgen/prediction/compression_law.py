@@ -4,7 +4,7 @@ A printed plate is bonded to its electrodes (thesis 4.2: layers adhere to each o
 conditions. Solutions of the prototypes' cells are stored; any other cell with gaps is solved on request, and kept.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import sha256
@@ -352,7 +352,11 @@ def _mirrored(outlines: Sequence[tuple[Point, ...]]) -> list[tuple[Point, ...]]:
 
 
 def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece: PressedPiece) -> Law:
-    """A plate: bonded to electrodes that it stretches, on a base that holds the lower one; or as ``name`` says."""
+    """A plate: bonded to electrodes that it stretches, on a base that holds the lower one; or as ``name`` says.
+
+    A solid with cogs, or of several materials, as one of the film's material between plain electrodes, its range from
+    the softest to the stiffest of all in it.
+    """
     if name in ("infill", "solved"):
         raise OutOfRange(f"{design.shape} is a solid plate: expected the law 'unconfined', 'bonded' or 'symmetric'")
     soft, ratio = moduli[film(design)], poisson_ratio(design, film(design))
@@ -368,7 +372,22 @@ def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece
         for law, where in ((tied, "on a base that holds the lower one"), (sliding, "on one that slides"),
                            (stiff, "between stiff faces"))
     )  # fmt: skip
-    return Law(tied, (soft,), (f"plate bonded to electrodes that it stretches: {how}",), (sliding, stiff))
+    inside = [moduli[name].value / e for name in _inside(piece.scene)]
+    others = sliding.scaled_modulus(min(inside)), stiff.scaled_modulus(max(inside))
+    return Law(tied, (soft,), (f"plate bonded to electrodes that it stretches: {how}", *_of_cogs(piece.scene)), others)
+
+
+def _inside(scene: Scene) -> set[str]:
+    """Materials below the top of the upper electrode that are no electrode's."""
+    roof = max(p.span("z")[1] for body in scene.bodies if body.terminal == "top" for p in body.pieces)
+    return {b.material for b in scene.bodies if not b.terminal and min(p.span("z")[0] for p in b.pieces) < roof}
+
+
+def _of_cogs(scene: Scene) -> Iterator[str]:
+    """Remark on a solid that is not even."""
+    spans = {(body.terminal, p.span("z")) for body in scene.bodies if body.terminal for p in body.pieces}
+    if len(_inside(scene)) > 1 or len(spans) > len({terminal for terminal, _ in spans}):
+        yield "a solid with cogs, or of several materials, taken as a plate of its film's material between flat faces"
 
 
 def _bonded(
