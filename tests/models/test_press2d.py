@@ -69,6 +69,17 @@ def test_choices_of_the_boundary(name, held, nu):
     assert found.displacement_m[1:] * 1e6 == pytest.approx(known[1:], rel=0.02)
 
 
+def test_a_plate_that_widens_gains_area():
+    """Free layers keep their volume: strain p (1 - nu^2) / E thins the film and widens it, and C rises by both."""
+    plate = make({"shape": "reference"}).in_use
+    loads, top = [0.0, 1e4], BoundaryConditions("sliding", "free", "rigid")
+    alike = dict.fromkeys(("x60", "etpu"), press2d.Elastic(6e6, 0.5))
+    rest, risen = (
+        c.middle() for c in press2d.press(press2d.cell(plate, None), alike, loads, EPS, top).capacitance_f_per_m2
+    )
+    assert risen / rest - 1 == pytest.approx(2 * 1e4 * 0.75 / 6e6, rel=0.01)
+
+
 def test_exactly_incompressible_is_the_limit():
     moved = [press2d.press(tri(), solids(nu), STRESSES[:2]).displacement_m[-1] for nu in (0.4999, 0.49999, 0.5)]
     assert moved[2] == pytest.approx(moved[1], rel=1e-3)
@@ -98,6 +109,7 @@ def test_levels_that_differ_are_told():
     found = press2d.press(tri(), solids(), STRESSES[:2])
     other = press2d.press(tri(), solids(x60=6.3e6), STRESSES[:2])
     assert "two meshes differ by" in press2d.compared(found, other).faults[-1]
+    assert press2d.compared(found, found).doubts[-1] == "two meshes differ by 0.00% in displacement"
 
 
 def test_a_plate_between_fixed_sides_is_confined():

@@ -248,7 +248,7 @@ class MappedField:
         }
 
     def capacitance(self, u_m: Real) -> Interval:
-        """Bounds of the capacitance per area of the deformed cell [F/m2].
+        """Bounds of the capacitance of the deformed cell per area of the cell as drawn [F/m2].
 
         Parameters
         ----------
@@ -263,7 +263,7 @@ class MappedField:
         regions, nodes = self.mesh.bricks.regions, self.mesh.nodes[self.carrying]
         eps = np.array([self.permittivity.get(r.material, np.nan) for r in regions])[self.mesh.region[self.carrying]]
         places = u_m.reshape(-1, 3)[nodes] + self.mesh.points_m[nodes]
-        area = float(np.prod([np.ptp(places[..., axis]) for axis in (0, 1)]))
+        area = float(np.prod(np.ptp(self.mesh.points_m[nodes].reshape(-1, 3), axis=0)[:2]))
         least, missing = self.systems["flux"].least(places, eps)
         lower, upper = (least - missing) / area, self.systems["potential"].least(places, eps)[0] / area
         if not 0 < lower <= upper * (1 + _ROUNDING):

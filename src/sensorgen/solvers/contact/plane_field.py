@@ -56,12 +56,12 @@ class Wedge:
 
 
 def capacitance(cell: ContactCell, mesh: TriangleMesh, permittivity: Mapping[str, float]) -> Interval:
-    """Bounds of the capacitance per area of a cell [F/m2].
+    """Bounds of the capacitance of a cell per area of the cell as drawn [F/m2].
 
     Parameters
     ----------
     cell : ContactCell
-        Mirrored.
+        Mirrored, as drawn.
     mesh : TriangleMesh
         From :func:`meshed`, pressed or not.
     permittivity : mapping of str to float
@@ -88,7 +88,8 @@ def capacitance(cell: ContactCell, mesh: TriangleMesh, permittivity: Mapping[str
     eps = np.array([permittivity.get(r.material, np.nan) for r in cell.regions])[mesh.region[inside] - 1]
     x = mesh.points_m[:, 0]
     width = float(np.ptp(x))
-    area = np.pi * width**2 if cell.turned else width
+    drawn_m = cell.width_mm() * M_PER_MM
+    area = np.pi * drawn_m**2 if cell.turned else drawn_m
     sides = [abs(x - end) < _ROUNDING * width for end in (x.min(), x.max())]
     potentials, streams = _energies(mesh, inside)
     upper = _energy(mesh.outer[inside], potentials * eps[:, None, None], *ends) / area

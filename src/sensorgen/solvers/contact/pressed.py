@@ -326,9 +326,10 @@ def _columns(parts: Sequence[Pressed]) -> dict[str, Any]:
 
 
 def compared(coarser: Pressed, finer: Pressed) -> Pressed:
-    """The finer of two solutions, with a fault where they differ by more than 1 %."""
+    """The finer of two solutions, and by how much they differ: a fault where displacements do by more than 1 %."""
     n = min(len(coarser.stress_pa), len(finer.stress_pa))
     apart = float(np.max(np.abs(coarser.displacement_m[1:n] / finer.displacement_m[1:n] - 1), initial=0.0))
+    differ = f"two meshes differ by {apart:.2%} in displacement"
     if apart <= _LEVELS:
-        return finer
-    return replace(finer, faults=(*finer.faults, f"two meshes differ by {apart:.1%} in displacement"))
+        return replace(finer, doubts=(*finer.doubts, differ))
+    return replace(finer, faults=(*finer.faults, differ))
