@@ -70,9 +70,9 @@ def loose(slices: Slices) -> Iterator[Finding]:
         return
     joined = _joined([shapely.union_all([slices.body(b, k) for b in bodies]) for k in range(len(slices.layers))])
     for body in bodies:
-        regions = [slices.body(body, k) for k in range(len(joined))]
-        if not any(shapely.intersection(r, j).area > SLIVER_MM**2 for r, j in zip(regions, joined, strict=True)):
-            first = next(k for k, region in enumerate(regions) if not region.is_empty)
+        regions = np.array([slices.body(body, k) for k in range(len(joined))])
+        if shapely.area(shapely.intersection(regions, joined)).max() < SLIVER_MM**2:
+            first = int(np.argmin(shapely.is_empty(regions)))
             at = regions[first].centroid
             yield Finding(
                 "9-loose", "error", body.name, "nothing holds it once the support is washed out",

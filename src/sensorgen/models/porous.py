@@ -109,16 +109,14 @@ def filling(scene: Scene, modulus_pa: Mapping[str, float]) -> Filling | None:
 def _bend_per_pa(
     scene: Scene, levels: Sequence[float], moduli: Real, area: Real, modulus_pa: Mapping[str, float]
 ) -> float:
-    """How much the upper electrode bends over the highest level that has air, as :class:`Filling` has it."""
+    """Bend of the upper electrode over the highest level that has air, as :class:`Filling` has it."""
     airy = np.flatnonzero((moduli == 0).any(axis=0))
     if not airy.size:
         return 0.0
     middle = (levels[airy[-1]] + levels[airy[-1] + 1]) / 2
-    between = [p for body, p in scene.pieces if not body.terminal and p.span("z")[0] < middle < p.span("z")[1]]
-    top = [(body.material, p) for body, p in scene.pieces if body.terminal == "top"]
-    reach = _farthest_mm([p for _, p in top], between)
-    heights = [z for _, p in top for z in p.span("z")]
-    stiffness = min(modulus_pa[name] for name, _ in top) * (max(heights) - min(heights)) ** 3 / 12
+    (material, *_), top = zip(*((body.material, p) for body, p in scene.pieces if body.terminal == "top"), strict=True)
+    reach = _farthest_mm(top, [p for body, p in scene.pieces if not body.terminal and p.cut("z", middle)])
+    stiffness = modulus_pa[material] * float(np.ptp([p.span("z") for p in top])) ** 3 / 12
     open_ = moduli[:, airy[-1]] == 0
     air = (moduli[open_] == 0) @ np.diff(levels)
     return float(area[open_] @ (1 / air) / area[open_].sum()) * 2 / 15 * reach**4 / stiffness

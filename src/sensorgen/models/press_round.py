@@ -86,7 +86,7 @@ def cell(scene: Scene, fineness: Fineness = USUAL) -> ContactCell:
     except ValueError as error:
         raise BadInput(f"{_WANTED}: {error}") from None
     (x0, y0, z0), (x1, y1, _) = window.low_mm, window.high_mm
-    inner = [p for _, p in scene.pieces if _overlap(p.span("x"), (x0, x1)) and _overlap(p.span("y"), (y0, y1))]
+    inner = _inner(scene, (x0, x1), (y0, y1))
     z1 = max(p.span("z")[1] for p in inner)  # of isolation and block, too
     why = ""
     for (x, across), (y, along) in product(*([(a, 2), ((a + b) / 2, 1), (b, 2)] for a, b in ((x0, x1), (y0, y1)))):
@@ -96,15 +96,22 @@ def cell(scene: Scene, fineness: Fineness = USUAL) -> ContactCell:
         except BadInput as error:
             why = why or str(error)
             continue
-        edge_mm = round(plan.radius_mm(plan.box), _DIGITS)
-        if any(edge_mm - shape.bounds[2] > _SAME_MM for region, shape in whole.items() if region.terminal):
-            raise BadInput(f"{_WANTED}: an electrode ends before the cell does")
-        return partition(whole, shapely.box(0.0, round(z0, _DIGITS), edge_mm, round(z1, _DIGITS)), turned=True)
+        return _whole(whole, shapely.box(*np.round([0.0, z0, plan.radius_mm(plan.box), z1], _DIGITS)))
     raise BadInput(f"{_WANTED}: {why}")
 
 
-def _overlap(one: Sequence[float], other: Sequence[float]) -> bool:
-    return min(one[1], other[1]) - max(one[0], other[0]) > SLIVER_MM
+def _inner(scene: Scene, x_mm: Point, y_mm: Point) -> list[Piece]:
+    """Pieces that have a part between two places along x and along y [mm]."""
+    ends = {"x": x_mm, "y": y_mm}
+    shared = [min(min(p.span(n)[1], b) - max(p.span(n)[0], a) for n, (a, b) in ends.items()) for _, p in scene.pieces]
+    return [p for (_, p), of in zip(scene.pieces, shared, strict=True) if of > SLIVER_MM]
+
+
+def _whole(regions: dict[Region, shapely.Geometry], box: shapely.Polygon) -> ContactCell:
+    """A cell of regions in a box, whose electrodes reach its end."""
+    if any(box.bounds[2] - of.bounds[2] > _SAME_MM for region, of in regions.items() if region.terminal):
+        raise BadInput(f"{_WANTED}: an electrode ends before the cell does")
+    return partition(regions, box, turned=True)
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ Each column is free to bulge, independent of its neighbours, and carries load on
 """
 
 from collections.abc import Mapping, Sequence
+from operator import attrgetter
 
 import numpy as np
 
@@ -59,7 +60,7 @@ def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Seq
     except ValueError as error:
         raise BadInput(f"no springs of columns: {error}") from None
     for part in sections_of:
-        for column in (c for c in part.columns if c.layers):
+        for column in filter(attrgetter("layers"), part.columns):
             bottoms, tops = (
                 np.array([getattr(layer, key) for layer in column.layers]) @ np.array([1 - share, share])
                 for key in ("bottom_mm", "top_mm")

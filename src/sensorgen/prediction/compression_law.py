@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sensorgen.checks import estimate
 from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError, UnknownName
@@ -246,6 +245,8 @@ def nearest(design: Design, piece: PressedPiece, answer: Answer, until_pa: float
 
 def like_infill(design: Design, piece: PressedPiece) -> bool:
     """Test whether the law of infill comes first: lines of sparse infill, or a cell that no solver applies to."""
+    from sensorgen.checks import estimate
+
     if piece.period_mm is not None:
         return False
     sparse = any(lines.infill < 1 for lines in estimate.lines(design).values())

@@ -25,7 +25,7 @@ from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_
 from sensorgen.prediction.query import DEFAULT, FLAT, Load, Query, Tip
 from sensorgen.prediction.reference_load import ReferenceLoad
 from sensorgen.prediction.rest_state import Lost, RestState, lost, rest_state
-from sensorgen.scene.scene import SLIVER_MM
+from sensorgen.scene.scene import SLIVER_MM, Scene
 from sensorgen.scene.sections import square_to
 from sensorgen.scene.slabs import is_open
 
@@ -143,9 +143,7 @@ def _no_line(body: Body, rest: RestState) -> str:
     scene = body.cells.first()
     if set(rest.resistance) != set(ENDS):
         return "an electrode does not run from end to end: the sensor at rest is predicted, not its response"
-    spans = sorted(p.span("z") for _, p in body.design.in_use.pieces)
-    tops = accumulate((high for _, high in spans), max)
-    if any(low - top > SLIVER_MM for (low, _), top in zip(spans[1:], tops, strict=False)):
+    if _has_air_layer(body.design.in_use):
         return "what lies above a layer of air is held by nothing: the sensor at rest is predicted, not its response"
     if not is_open(scene):
         return ""
@@ -153,6 +151,13 @@ def _no_line(body: Body, rest: RestState) -> str:
     if all(len(square_to(electrode, "x")) == 1 for electrode in ends):
         return ""
     return "an electrode changes along the sensor: the sensor at rest is predicted, not its response"
+
+
+def _has_air_layer(scene: Scene) -> bool:
+    """Test whether some height between the lowest and the highest place of a scene is air all over."""
+    spans = sorted(p.span("z") for _, p in scene.pieces)
+    tops = accumulate((high for _, high in spans), max)
+    return any(low - top > SLIVER_MM for (low, _), top in zip(spans[1:], tops, strict=False))
 
 
 def _thickness_m(body: Body, rest: RestState) -> tuple[float, float]:
