@@ -10,7 +10,7 @@ import shapely
 from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.scene.layers import overlay_parts
-from sensorgen.scene.scene import SLIVER_MM, Piece, Scene, shadow
+from sensorgen.scene.scene import Piece, Scene, shadow
 from sensorgen.scene.sections import Layer, SectionColumn
 
 SOURCE = "Wiener (1912), Gent & Lindley (1959), Hashin & Shtrikman (1962, 1963), Gibson & Ashby (1997)"
@@ -49,17 +49,6 @@ class Filling:
         walls = share * (eps - 1) / (share * eps + 1 - share)
         layers = share * (1 - 1 / eps) / (share / eps + 1 - share)
         return Interval(1.0, 1 + max(walls, layers))
-
-
-def is_solid(scene: Scene) -> bool:
-    """True where solids fill every column of a scene: air has no place, cogs or not."""
-    try:
-        columns = [column.layers for part in overlay_parts(scene) for column in part.columns]
-    except ValueError:
-        return False
-    faces = [(a.top_mm, b.bottom_mm) for layers in columns for a, b in pairwise(layers)]
-    ends = all({"bottom", "top"} <= {layer.body.terminal for layer in layers} for layers in columns)
-    return ends and bool(faces) and float(np.ptp(faces, axis=1).max()) < SLIVER_MM
 
 
 def filling(scene: Scene, modulus_pa: Mapping[str, float]) -> Filling | None:

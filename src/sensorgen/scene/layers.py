@@ -288,6 +288,17 @@ def overlay_parts(scene: Scene) -> list[OverlayPart]:
     return [OverlayPart(1.0, patches, tuple(range(len(patches))), in_plan=True)]
 
 
+def is_solid(scene: Scene) -> bool:
+    """True where solids fill every column of a scene: air has no place, cogs or not."""
+    try:
+        columns = [column.layers for part in overlay_parts(scene) for column in part.columns]
+    except ValueError:
+        return False
+    faces = [(a.top_mm, b.bottom_mm) for layers in columns for a, b in pairwise(layers)]
+    ends = all({"bottom", "top"} <= {layer.body.terminal for layer in layers} for layers in columns)
+    return ends and bool(faces) and float(np.ptp(faces, axis=1).max()) < SLIVER_MM
+
+
 @lru_cache(maxsize=8)
 def _patches(scene: Scene) -> tuple[SectionColumn, ...]:
     """Pieces of the plan over which the same layers lie, those of one look as one."""
