@@ -35,6 +35,7 @@ from sensorgen.scene.sections import ROUNDING_MM, Layer, SectionColumn, alike, c
 
 Region: TypeAlias = Polygon | MultiPolygon
 EMPTY = MultiPolygon()
+_SOLID = 1e-6  # share of air in a solid, by rounding
 _BELOW_MM = 1e-7  # of a face at mid-height, all slicers print the body below it
 
 
@@ -289,14 +290,15 @@ def overlay_parts(scene: Scene) -> list[OverlayPart]:
 
 
 def is_solid(scene: Scene) -> bool:
-    """True where solids fill every column of a scene: air has no place, cogs or not."""
-    try:
-        columns = [column.layers for part in overlay_parts(scene) for column in part.columns]
-    except ValueError:
-        return False
-    faces = [(a.top_mm, b.bottom_mm) for layers in columns for a, b in pairwise(layers)]
-    ends = all({"bottom", "top"} <= {layer.body.terminal for layer in layers} for layers in columns)
-    return ends and bool(faces) and float(np.ptp(faces, axis=1).max()) < SLIVER_MM
+    """True where bodies fill a scene, cogs or not, between electrodes over all of its plan: air has no place."""
+    spans = np.array([[piece.span(axis) for axis in "xyz"] for _, piece in scene.pieces])
+    low, high = spans[..., 0].min(axis=0), spans[..., 1].max(axis=0)
+    whole = np.ptp(spans, axis=2)[:, :2].prod(axis=1) > (1 - _SOLID) * (high - low)[:2].prod()
+    plates = {
+        body.terminal for (body, piece), all_of in zip(scene.pieces, whole, strict=True) if all_of and piece.is_box()
+    }
+    volume = sum(piece.volume_mm3() for _, piece in scene.pieces)
+    return {"bottom", "top"} <= plates and volume > (1 - _SOLID) * (high - low).prod()
 
 
 @lru_cache(maxsize=8)
