@@ -416,3 +416,23 @@ def test_a_sensor_cut_to_an_outline_is_sliced_and_predicted(run, program):
     assert found["capacitance"]["value"] == pytest.approx(8.8541878128e-12 * eps * area / 0.6e-3, rel=0.02)
     assert "--border" in run("build", "reference", "--help").out
     assert "the border is 10 mm" in run("check", *words, "--size", "25x10").line
+
+
+def test_a_middle_electrode_is_read_by_stack(run, tmp_path):
+    """As the shape of the same plates; it was refused with the advice to use this command."""
+    heights = {"low": (0.0, 0.3), "under": (0.3, 0.8), "mid": (0.8, 1.1), "over": (1.1, 1.8), "up": (1.8, 2.1)}
+    maps = ["--map", "*=etpu@2", "--map", "under=x60@1", "--map", "over=x60@1"]
+    assert run("import", *stacked(tmp_path, **heights), *maps, "--name", "three").code == 0
+    said = run("stack", "three.yaml")
+    plates = {"length": 20, "width": 10, "electrode": 0.3, "lower-dielectric": 0.5, "upper-dielectric": 0.7}
+    drawn = run("stack", "double", *(word for key, value in plates.items() for word in (f"--{key}", str(value))))
+    assert (said.code, said.out) == (0, drawn.out)
+    checked = run("check", "three.yaml")
+    assert (checked.code, checked.words.startswith("PRINT three: no findings; estimated")) == (0, True)
+    assert "; not predicted" in checked.words
+    heights = {"low": (0.0, 0.3), "post": (0.3, 1.8), "mid": (0.8, 1.1), "up": (1.8, 2.1)}
+    files = stacked(tmp_path, **heights)
+    trimesh.creation.box(bounds=[(5, 2, 0.8), (15, 8, 1.1)]).export(tmp_path / "mid.stl")
+    trimesh.creation.box(bounds=[(0, 0, 0.3), (4, 10, 1.8)]).export(tmp_path / "post.stl")
+    assert run("import", *files, "--map", "*=etpu@2", "--map", "post=x60@1", "--name", "beside").code == 0
+    assert "post: beside the middle electrode, which is from 0.8 to 1.1 mm" in run("stack", "beside.yaml").line
