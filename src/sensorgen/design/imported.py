@@ -188,6 +188,11 @@ def scene(geometry: str, filled: Mapping[str, Filled]) -> Scene:
     return Scene(tuple(drawn), content.size_mm)
 
 
+def middle(filled: Mapping[str, Filled]) -> set[str]:
+    """Names of the bodies of a middle electrode."""
+    return {name for name, one in filled.items() if one.terminal == "middle"}
+
+
 def halves(geometry: str, filled: Mapping[str, Filled]) -> list[dict[str, Any]]:
     """Geometry and bodies of the sensors below and above a middle electrode, which both have it.
 
@@ -197,11 +202,11 @@ def halves(geometry: str, filled: Mapping[str, Filled]) -> list[dict[str, Any]]:
         A body is neither below nor above the middle electrode.
     """
     pieces = bodies(geometry).pieces
-    shared = {name for name, one in filled.items() if one.terminal == "middle"}
+    shared = middle(filled)
     low, high = _ends(piece for name in shared for piece in pieces[name])
     lower = {name: own for name, own in pieces.items() if _ends(own)[1] <= high}
     upper = {name: own for name, own in pieces.items() if _ends(own)[0] >= low}
-    if beside := sorted(name for name in pieces if (name in lower) + (name in upper) != 1 + (name in shared)):
+    if beside := sorted(n for n in pieces.keys() - shared if (n in lower) == (n in upper)):
         raise BadInput(
             f"{', '.join(beside)}: beside the middle electrode, which is from {low:g} to {high:g} mm; expected each "
             "body below or above it: divide it in CAD"

@@ -83,7 +83,7 @@ def stacked(
 
 def halves(design: Design) -> list[Design]:
     """A double sensor as the two sensors that share its middle electrode; any other design is its own only one."""
-    if any(filled.terminal == "middle" for filled in design.bodies.values()):
+    if imported.middle(design.bodies):
         given = design.model_dump(exclude_defaults=True, mode="json")
         return [make(given | half) for half in imported.halves(design.geometry or "", design.bodies)]
     if design.shape == "double_tri":
