@@ -165,7 +165,7 @@ def study(
 
 
 def _per_square(model: SensorModel) -> tuple[list[float], list[str]]:
-    """Sheet resistance of top and bottom, with cogs the geometric mean of both directions [ohm], and why it is doubtful.
+    """Sheet resistance of both electrodes, the geometric mean of both directions [ohm], and why it is doubtful.
 
     Stretching one axis makes a sheet of two resistances isotropic, of their geometric mean.
     """

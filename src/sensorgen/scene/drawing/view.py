@@ -16,6 +16,7 @@ from sensorgen.scene.sections import Section, SectionColumn, alike, columns, dis
 PLACES = 8  # places tried for a section: two periods of crossed strips change eight times
 PROBE = 64  # corners looked at for a period: enough for two repetitions of any pattern one would draw
 SAME_MM, SAME_DIGITS = 1e-6, 6
+CHORD_MM = 0.01  # of facets from the curved face that they stand for, as an import has them
 MOST_LEVELS, MOST_COLUMNS, MOST_EXTENTS, MOST_PIECES = 9, 8, 3, 2  # measures of a view
 Region = tuple[Body, Outline]
 
@@ -201,7 +202,7 @@ def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
 def _columns(view: View, edges: Sequence[float], reach: Sequence[float]) -> tuple[list[Measure], list[Measure]]:
     """Widths of the columns, unless there are too many, and of a period, where the view shows all of it."""
     steps = [Measure(a, b, ends) for (a, b), ends in zip(pairwise(edges), pairwise(reach), strict=True)]
-    repeats = view.period_mm and len(edges) == len(view.period_mm)
+    repeats = view.period_mm and edges[-1] == view.period_mm[-1]
     whole = [Measure(edges[0], edges[-1], (reach[0], reach[-1]))] if repeats else []
     return steps if 1 < len(steps) <= MOST_COLUMNS else [], whole
 
@@ -209,7 +210,17 @@ def _columns(view: View, edges: Sequence[float], reach: Sequence[float]) -> tupl
 def _edges(view: View) -> list[float]:
     """Edges of the columns of a period, or of all columns where nothing repeats, as far as the view goes [mm]."""
     columns = [*(column.left_mm for column in view.columns), view.columns[-1].right_mm]
-    return [u for u in view.period_mm or columns if u <= view.end_mm + SAME_MM]
+    within, bends = [u for u in view.period_mm or columns if u <= view.end_mm + SAME_MM], set(_bends(view))
+    return [u for u in within if u in (within[0], within[-1]) or any(abs(u - bend) < SAME_MM for bend in bends)]
+
+
+def _bends(view: View) -> Iterator[float]:
+    """Places of corners, but for those between the facets of a curved face [mm]."""
+    for _, outline in view.regions:
+        for before, corner, after in zip(outline[-1:] + outline[:-1], outline, outline[1:] + outline[:1], strict=True):
+            foot = _foot(corner, before, after)
+            if hypot(corner[0] - foot[0], corner[1] - foot[1]) > CHORD_MM:
+                yield corner[0]
 
 
 def _filled(rows: Iterable[list[Measure]]) -> list[list[Measure]]:
