@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -284,9 +285,20 @@ def test_without_a_map_nothing_is_imported(run, plates):
     before = sorted(Path().iterdir())
     said = run("import", *files, "--unit", "mm")
     assert said.code == WRONG_INPUT
-    assert "expected sensorgen import low.stl film.stl up.stl --map low=MATERIAL --map film=x60" in said.line
+    assert "expected sensorgen import low.stl film.stl up.stl --unit mm --map low=MATERIAL --map film=x60" in said.line
     assert said.out == run("import", *files, "--unit", "mm", "--list").out
     assert sorted(Path().iterdir()) == before
+
+
+def test_the_command_that_a_list_ends_with_can_be_pasted(run, plates):
+    """It had neither the folder of a file nor its unit, and was wrapped amid the command."""
+    Path("my parts").mkdir()
+    files = [str(Path(name).rename(Path("my parts") / name)) for name in plates()]
+    listed = run("import", *files, "--unit", "mm", "--list").out.replace("MATERIAL", "etpu")
+    command = shlex.split(listed.partition("To import it:\n")[2].replace("\\\n", " "))
+    assert command[0] == "sensorgen"
+    assert run(*command[1:]).code == 0
+    assert load(Path("low.yaml")).drawn.size_mm == (20.0, 10.0, 1.0)
 
 
 def test_a_list_writes_no_picture(run, plates):

@@ -58,22 +58,23 @@ def import_command(
     if not 1e-4 <= chord <= 1.0:
         raise BadInput(f"--chord {chord:g}: expected 0.0001 to 1 mm")
     assembly = reading.read(list(files), unit, chord)
-    name = name or files[0].stem
-    if only_list or assembly.errors or not maps:
-        return _listed(assembly, out, None if only_list else out / f"{name}-faults.svg")
-    bodies = assign(assembly, maps, terminals, out)
     more = dict(word for word in (("printer", printer), ("quality", quality)) if word[1])
-    design = write(assembly, bodies, name=name, folder=out, more=more, replace_existing=force)
+    if only_list or assembly.errors or not maps:
+        given = {"unit": unit, "chord": "" if chord == reading.CHORD_MM else f"{chord:g}", "name": name} | more
+        typed = [*map(str, files), *(word for key, value in given.items() if value for word in (f"--{key}", value))]
+        return _listed(assembly, out, None if only_list else out / f"{name or files[0].stem}-faults.svg", typed)
+    bodies = assign(assembly, maps, terminals, out)
+    design = write(assembly, bodies, name=name or files[0].stem, folder=out, more=more, replace_existing=force)
     render.deliver(design)
     return FOUND_ERRORS if design.errors else 0
 
 
-def _listed(assembly: Any, folder: Path, drawing: Path | None) -> int:
+def _listed(assembly: Any, folder: Path, drawing: Path | None, typed: list[str]) -> int:
     """List bodies that are not imported, and raise the reason unless a list is all that was asked for."""
     from sensorgen.core import files
     from sensorgen.workflows.importing import BodyListing, reading
 
-    listed = BodyListing.of(assembly, folder)
+    listed = BodyListing.of(assembly, folder, typed)
     render.deliver(listed)
     if assembly.errors:
         first, where = assembly.errors[0], "nothing is imported"
