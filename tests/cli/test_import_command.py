@@ -312,6 +312,23 @@ def test_a_list_writes_no_picture(run, plates):
     assert [p.name for p in Path().iterdir() if p not in before] == ["low-faults.svg"]
 
 
+def test_a_changed_sensor_keeps_its_name(run, plates):
+    """It was named after its size: imported-length20-width10, as any other one of that size."""
+    for name, film in (("a", (0.4, 0.6)), ("b", (0.4, 0.61))):
+        files = plates(film=film, up=(film[1], 1.0))
+        assert run("import", *files, "--unit", "mm", "--name", name, *PLATES, "--force").code == 0
+    words = (("a", ()), ("a", ("eps_x60=3",)), ("a", ("eps_x60=3.1",)), ("b", ("eps_x60=3",)))
+    names = [
+        json.loads(run("cell", f"{name}.yaml", "--drawn", "--json", *(w for s in sets for w in ("--set", s))).out)[
+            "design"
+        ]
+        for name, sets in words
+    ]
+    assert names[0] == "a"
+    assert [name[:2] for name in names[1:]] == ["a-", "a-", "b-"]
+    assert len(set(names)) == 4
+
+
 def test_a_replaced_design_leaves_no_bodies_behind(run, plates):
     words = ["--unit", "mm", "--name", "a", *PLATES]
     assert run("import", *plates(), *words).code == 0

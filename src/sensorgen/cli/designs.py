@@ -298,6 +298,8 @@ def _design(base: Data, given: Data, word: str) -> "Design":
         data["name"] = chosen.name
     elif data == unnamed and "name" in base:
         data["name"] = base["name"]
+    elif "geometry" in base:  # which has no parameters to be named after
+        data["name"] = f"{str(base['name'])[:90]}-{design.digest(str(data))}"
     return design.make(data, word if _is_file(word) else "")
 
 
