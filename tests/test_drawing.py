@@ -3,7 +3,7 @@
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
 from math import cos, pi, sin
 
 import pytest
@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from sensorgen.core import lazy as registry
 from sensorgen.core.findings import Finding
 from sensorgen.design import shapes
+from sensorgen.design.design import make
 from sensorgen.scene import drawing
 from sensorgen.scene.drawing import svg
 from sensorgen.scene.drawing.panels import beside
@@ -380,6 +381,26 @@ def test_the_period_survives_a_pattern_that_begins_within_one() -> None:
     assert strips["y"].repeat_mm() == pytest.approx(2.0)
     assert period(Section("x", 1.0, 0.5, ())) == ()
     assert views(scene_of("reference"))[0].period_mm == ()
+
+
+def test_details_of_an_array_show_a_crossing() -> None:
+    """They showed the leads at the sensor's corner alone; letters lay below the outlines of the print."""
+    parameters = {"length_mm": 30, "width_mm": 20, "pitch_x_mm": 9, "pitch_y_mm": 7, "column_mm": 6, "row_mm": 6}
+    array = make({"shape": "array", "parameters": parameters, "cell": {"shape": "tri"}}).printed
+    text = svg(array, "an array", layers_of(array), (), COLOURS, printed=array)
+    page = ET.fromstring(text)
+    stays_on_page(page)
+    windows = re.findall(r"Section .: . = \S+ mm, . from (\S+) to (\S+) mm, \d", text)
+    assert len(windows) == 2
+    for view, (start, end) in zip(views(array), windows, strict=True):
+        tracks: dict[str, list[Point]] = {"top": [], "bottom": []}
+        for body, outline in view.section.regions:
+            if body.terminal:
+                tracks[body.terminal].append((min(u for u, _ in outline), max(u for u, _ in outline)))
+        shared = [(max(a, c), min(b, d)) for (a, b), (c, d) in product(tracks["top"], tracks["bottom"])]
+        assert max(min(high, float(end)) - max(low, float(start)) for low, high in shared) > 1.9  # a cog and more
+        assert max(min(high, 10.0) - low for low, high in shared) < 0  # at the corner
+    assert text.rindex('class="printed"') < text.index(">A</text>")
 
 
 def test_the_gap_is_the_smallest_distance_even_aslant() -> None:
