@@ -63,7 +63,7 @@ def test_fits_every_width_in_both_themes(browser, made):
 def test_heights_of_a_section_can_be_read(browser, tmp_path):
     """Of a thick sensor, whose sections are longer, they were 2 to 3 px high."""
     page = tmp_path / "thick.html"
-    page.write_text(page_of(make({"shape": "rect", "parameters": {"upper_height_mm": 1.5, "length_mm": 20}})), "utf-8")
+    page.write_text(page_of(make({"shape": "reference", "parameters": {"dielectric_mm": 3.0}})), "utf-8")
     for width in (360, 768, 1280):
         browser.size(width)
         browser.open(page)
