@@ -57,23 +57,25 @@ def import_command(
 
     if not 1e-4 <= chord <= 1.0:
         raise BadInput(f"--chord {chord:g}: expected 0.0001 to 1 mm")
-    assembly = reading.read(list(files), unit, chord)
+    assembly, design_name = reading.read(list(files), unit, chord), name or files[0].stem
     more = dict(word for word in (("printer", printer), ("quality", quality)) if word[1])
     if only_list or assembly.errors or not maps:
-        given = {"unit": unit, "chord": "" if chord == reading.CHORD_MM else f"{chord:g}", "name": name} | more
-        typed = [*map(str, files), *(word for key, value in given.items() if value for word in (f"--{key}", value))]
-        return _listed(assembly, out, None if only_list else out / f"{name or files[0].stem}-faults.svg", typed)
+        options = {"unit": unit, "chord": "" if chord == reading.CHORD_MM else f"{chord:g}", "name": name} | more
+        return _listed(assembly, out, None if only_list else out / f"{design_name}-faults.svg", files, options)
     bodies = assign(assembly, maps, terminals, out)
-    design = write(assembly, bodies, name=name or files[0].stem, folder=out, more=more, replace_existing=force)
+    design = write(assembly, bodies, name=design_name, folder=out, more=more, replace_existing=force)
     render.deliver(design)
     return FOUND_ERRORS if design.errors else 0
 
 
-def _listed(assembly: Any, folder: Path, drawing: Path | None, typed: list[str]) -> int:
+def _listed(
+    assembly: Any, folder: Path, drawing: Path | None, named: tuple[Path, ...], options: dict[str, str]
+) -> int:  # fmt: skip
     """List bodies that are not imported, and raise the reason unless a list is all that was asked for."""
     from sensorgen.core import files
     from sensorgen.workflows.importing import BodyListing, reading
 
+    typed = [*map(str, named), *(word for key, value in options.items() if value for word in (f"--{key}", value))]
     listed = BodyListing.of(assembly, folder, typed)
     render.deliver(listed)
     if assembly.errors:

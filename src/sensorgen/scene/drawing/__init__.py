@@ -340,8 +340,7 @@ def svg(
         taken += space
     parts = [
         *_sections(details, lanes, grid, materials),
-        *(part for panel in details if printed for part in panels.outlined(panel, printed)),
-        *(part for panel in details for part in panels.lettered(panel, letters, materials)),
+        *(part for panel in details for part in panels.lettered(panel, letters, materials, printed)),
         mark,
         *on_detail(shown, details, grid, taken),
         *_overview(scene, details, wholes, materials),

@@ -217,8 +217,11 @@ def letter_places(panel: ViewPanel) -> dict[str, Point]:
     return {name: (min(max(x, left), right), y) for name, (_, (x, y)) in best.items()}
 
 
-def lettered(panel: ViewPanel, names: Mapping[str, str], colours: Colours) -> Iterator[str]:
-    """The bodies' letters, in ink that shows on their colour."""
+def lettered(
+    panel: ViewPanel, names: Mapping[str, str], colours: Colours, printed: Scene | None
+) -> Iterator[str]:  # fmt: skip
+    """Outlines of the print, and over them the bodies' letters, in ink that shows on their colour."""
+    yield from _outlined(panel, printed.bodies if printed else ())
     materials_of = {body.name: body.material for body, _ in panel.view.regions}
     for name, (x, y) in letter_places(panel).items():
         fill = colour(colours, materials_of[name])
@@ -249,10 +252,10 @@ def broken(panel: ViewPanel) -> str:
     return element("path", "under", d=path) + element("path", "thin", d=path) if path else ""
 
 
-def outlined(panel: ViewPanel, printed: Scene) -> Iterator[str]:
+def _outlined(panel: ViewPanel, bodies: Sequence[Body]) -> Iterator[str]:
     """Outlines of the printed bodies where a view cuts them, one path for each body."""
     view = panel.view
-    for body in printed.bodies:
+    for body in bodies:
         seen = (outline for p in body.pieces for outline in p.cut(view.normal, view.section.at_mm))
         path = "".join(panel.frame.outline(part) for o in seen if (part := clipped(o, view.end_mm, view.start_mm)))
         if path:

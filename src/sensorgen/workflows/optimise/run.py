@@ -235,8 +235,8 @@ _OUTLINE = ("length_mm", "width_mm")  # which lines too wide or too narrow chang
 def within_tolerance(target: Target, design: Design) -> Iterator[Design]:
     """The design with its outline, and with each other varied length in the plane, changed by the tolerance."""
     data, own = design.model_dump(mode="json", exclude_unset=True, exclude={"name"}), asdict(design.params)
-    varied = [name for name in own if name.endswith("_mm") and name in target.parameters and name not in _OUTLINE]
-    flat = [(name,) for name in varied if grid_mm(design, name) != design.layers.layer_mm]
+    varied = sorted(own.keys() & target.parameters.keys() - set(_OUTLINE))
+    flat = [(n,) for n in varied if n.endswith("_mm") and grid_mm(design, n) != design.layers.layer_mm]
     for names, sign in product((_OUTLINE, *flat) if target.tolerance_mm else (), (-1, 1)):
         changes = {name: own[name] + sign * target.tolerance_mm for name in names if name in own}
         with suppress(SensorgenError):  # no such design
