@@ -400,7 +400,7 @@ def test_details_of_an_array_show_a_crossing() -> None:
         shared = [(max(a, c), min(b, d)) for (a, b), (c, d) in product(tracks["top"], tracks["bottom"])]
         assert max(min(high, float(end)) - max(low, float(start)) for low, high in shared) > 1.9  # a cog and more
         assert max(min(high, 10.0) - low for low, high in shared) < 0  # at the corner
-    assert text.rindex('class="printed"') < text.index(">A</text>")
+    assert text[: text.index(">A</text>")].count('class="printed"') >= len(array.bodies) - 1
 
 
 def test_the_gap_is_the_smallest_distance_even_aslant() -> None:

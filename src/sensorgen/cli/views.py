@@ -60,7 +60,7 @@ def import_command(
     assembly, design_name = reading.read(list(files), unit, chord), name or files[0].stem
     more = dict(word for word in (("printer", printer), ("quality", quality)) if word[1])
     if only_list or assembly.errors or not maps:
-        options = {"unit": unit, "chord": "" if chord == reading.CHORD_MM else f"{chord:g}", "name": name} | more
+        options = {"unit": unit, "chord": f"{chord:g}" * (chord != reading.CHORD_MM), "name": name} | more
         return _listed(assembly, out, None if only_list else out / f"{design_name}-faults.svg", files, options)
     bodies = assign(assembly, maps, terminals, out)
     design = write(assembly, bodies, name=design_name, folder=out, more=more, replace_existing=force)
