@@ -11,6 +11,7 @@ from browser import Page
 from click import ClickException
 from click.testing import CliRunner
 
+from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange, SensorgenError
 from sensorgen.core.parallel import used_s
 from sensorgen.core.units import EPS0_F_PER_M
@@ -52,22 +53,26 @@ def flat(*layers):
 def off(peer, level, scene, permittivity, exact_f):
     if peers.missing(peer):
         pytest.skip(f"{peer}: {peers.missing(peer)}")
-    return peers.levels(peer, scene, permittivity)[level][1]() / exact_f - 1
+    value = peers.levels(peer, scene, permittivity)[level][1]()
+    if isinstance(value, Interval):
+        assert value.lower <= exact_f * (1 + 1e-12)
+        value = value.upper
+    return value / exact_f - 1
 
 
 @pytest.mark.parametrize("peer", peers.FIELD)
 @pytest.mark.parametrize("layers", [((0.6, "x60"),), ((0.2, "x60"), (0.4, "air"))], ids=["one", "two"])
 def test_plates_are_exact(peer, layers):
-    """Layers in series; finite elements hold them exactly, panels to a percent."""
+    """Layers in series; finite elements hold them to rounding, panels to a percent."""
     exact = EPS0_F_PER_M * 1e-3 / sum(thick / EPS[material] for thick, material in layers)
-    assert abs(off(peer, 0, flat(*layers), EPS, exact)) < (1e-12 if peer in FROM_ABOVE else 0.015)
+    assert abs(off(peer, 0, flat(*layers), EPS, exact)) < (2e-11 if peer in FROM_ABOVE else 0.015)
 
 
 @pytest.mark.parametrize("peer", peers.FIELD)
 @pytest.mark.parametrize(
     ("name", "levels", "most"),
     [
-        ("tri, 0.1 mm", (1, 2), {"FastCap": 0.15}),
+        ("tri, 0.1 mm", (2, 3), {"FastCap": 0.15}),
         ("rect, 0.1 mm", (0, 1), {"scikit-fem": 5e-3, "NGSolve": 1e-2, "FastCap": 0.07}),
     ],
 )  # fmt: skip
@@ -129,10 +134,10 @@ def test_the_chart_of_an_own_design(unpressed):
         assert p.error >= p.doubt > 0
         assert p.cold_cpu_s > 0
     for model in ("columns", "fem2d"):
-        assert all(p.certified and p.independent and "finest" in p.against for p in of(found, model))
+        assert all(p.certified and p.independent and p.against == "the bounds of NGSolve" for p in of(found, model))
     assert of(found, "fem2d")[-1].error < 2e-2
     for peer in FROM_ABOVE:
-        assert all(p.against == "the bounds of fem2d" for p in of(found, peer))
+        assert all(p.against.startswith("the bounds of ") and p.independent for p in of(found, peer))
     if circuit := [p.error for p in of(found, "ngspice")]:
         assert circuit[0] / circuit[1] == pytest.approx(100, rel=0.05)
     assert of(found, "line")[0].error < 1e-14

@@ -58,7 +58,7 @@ class TimedAnswer:
     answer : ModelAnswer
         Of the first time.
     cold, warm : Cost
-        From the start of the process, nothing stored; once more in the same process, with what it has stored.
+        From the start of the process; once more in the same process, solved anew.
     memory_mb : float or None
         Peak of the process, libraries included [MB]; None on a system without such a record.
     """
@@ -105,10 +105,12 @@ def apart(work: Work) -> TimedAnswer:
 
 def measured(work: Work, before_s: float, started: float) -> TimedAnswer:
     """An answer with its costs; the first one from when ``before_s`` were used and the clock stood at ``started``."""
-    answer = work()
+    with cache.held_back():
+        answer = work()
     cold = Cost(used_s() - before_s, time.time() - started)
     before_s, started = used_s(), time.time()
-    work()
+    with cache.held_back():
+        work()
     return TimedAnswer(answer, cold, Cost(used_s() - before_s, time.time() - started), _peak_mb())
 
 

@@ -176,10 +176,11 @@ def points(name: str, budget_s: float) -> list[ChartPoint]:
         if not module.why_not_applicable(standard.scene):
             for wanted, bounds, seconds in climb(_widths(module, standard), budget_s):
                 measured.append(point(name, model, bounds.times(1 / area), standard, seconds, wanted=wanted))
-    for model, levels, per in _unbounded(name, standard, area):
+    for model, levels, per in _of_others(name, standard, area):
         for level, value, seconds in climb(levels, budget_s):
-            one = Interval(value / per, value / per)
-            measured.append(point(name, model, one, standard, seconds, bounded=False, level=level))
+            bounded = isinstance(value, Interval)
+            one = (value if bounded else Interval(value, value)).times(1 / per)
+            measured.append(point(name, model, one, standard, seconds, bounded=bounded, level=level))
     return measured
 
 
@@ -191,7 +192,7 @@ def why_not_applicable(name: str) -> dict[str, str]:
     return {model: why for model, why in reasons.items() if why} | {"thesis_cells": only}
 
 
-def _unbounded(name: str, standard: KnownCapacitance, area_m2: float) -> Iterator[tuple[str, list[Level], float]]:
+def _of_others(name: str, standard: KnownCapacitance, area_m2: float) -> Iterator[tuple[str, list[Level], float]]:
     """Formulas of the thesis, then programs of others; their levels, and the area that they give a value for [m2]."""
     for formula, law in thesis_cells.NAMED.items():
         if standard.shape in law.shapes:

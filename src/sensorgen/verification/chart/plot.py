@@ -10,6 +10,7 @@ from sensorgen.analysis.plots import static
 from sensorgen.analysis.plots.figure import GREY, Axis, Curve, Figure, Panel, look
 from sensorgen.analysis.plots.pages import PageSection, page
 from sensorgen.core.lazy import by_key
+from sensorgen.verification import peers
 from sensorgen.verification.chart import kind_of
 from sensorgen.verification.chart.measured import ChartPoint
 from sensorgen.verification.design_chart.results import DesignChart, Point
@@ -25,8 +26,8 @@ OVERVIEW = (  # a cell in the plane and in 3D, a press, a line, a network, and t
 )  # fmt: skip
 
 ALT_OF_DESIGN = (
-    "Hollow: cold, in a new process with nothing stored. Filled: warm, once more in the same process. Dotted: what the "
-    "references are known to; no error is drawn below."
+    "Hollow: cold, in a new process with nothing stored. Filled: warm, solved once more in the same process. Dotted: "
+    "what the references are known to; no error is drawn below."
 )
 
 
@@ -50,19 +51,25 @@ AnyPoint = TypeVar("AnyPoint", ChartPoint, Point)
 
 def png(points: Sequence[ChartPoint]) -> bytes:
     """All scenes in one picture."""
-    return _picture("chart", TITLE, ALT, {figure.title: figure.choices[""] for figure in figures(points)})
+    return _picture("chart", TITLE, _words(ALT), {figure.title: figure.choices[""] for figure in figures(points)})
 
 
 def overview(points: Sequence[ChartPoint]) -> bytes | None:
     """The scenes that decide, in one picture; None where none of them was measured."""
     here = [p for name in OVERVIEW for p in points if p.scene == name]
     panels = {figure.title: figure.choices[""] for figure in figures(here)}
-    return _picture("overview", TITLE, ALT, panels) if here else None
+    return _picture("overview", TITLE, _words(ALT), panels) if here else None
+
+
+def _words(alt: str) -> str:
+    """Words of a picture, with the programs of others that are missing here."""
+    absent = ", ".join(name for name in peers.ALL if peers.missing(name))
+    return f"{alt} Not installed here: {absent}." if absent else alt
 
 
 def html(points: Sequence[ChartPoint]) -> str:
     """A page with a figure per scene."""
-    return page(TITLE, [ALT], [PageSection(figures=tuple(figures(points)))])
+    return page(TITLE, [_words(ALT)], [PageSection(figures=tuple(figures(points)))])
 
 
 def png_of_design(chart: DesignChart) -> bytes:
@@ -71,7 +78,7 @@ def png_of_design(chart: DesignChart) -> bytes:
         f"{figure.key}, {cost}": figure.choices[cost] for figure in figures_of_design(chart) for cost in _IN_PICTURE
         if cost in figure.choices
     }  # fmt: skip
-    return _picture("chart", _title(chart), ALT_OF_DESIGN, panels)
+    return _picture("chart", _title(chart), _words(ALT_OF_DESIGN), panels)
 
 
 def html_of_design(chart: DesignChart) -> str:
@@ -82,7 +89,7 @@ def html_of_design(chart: DesignChart) -> str:
         for key, title in chart.titles.items()
     ]
     load = f"{chart.body}; {chart.force_n:g} N at {chart.position_m * 1e3:g} mm."
-    return page(_title(chart), [load, ALT_OF_DESIGN], sections)
+    return page(_title(chart), [load, _words(ALT_OF_DESIGN)], sections)
 
 
 def _title(chart: DesignChart) -> str:

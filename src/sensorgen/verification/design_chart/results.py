@@ -9,6 +9,7 @@ from typing import Annotated
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import SensorgenError
+from sensorgen.core.lazy import by_key
 from sensorgen.design.body import Body
 from sensorgen.models.compression import Plate
 from sensorgen.prediction.query import Query
@@ -66,8 +67,8 @@ class Point:
     contradicted : bool
         Whether it is further off than it states, by more than the reference is in doubt.
     cold_cpu_s, cold_wall_s, warm_cpu_s, warm_wall_s : float
-        Time of the processor and by the clock: in a new process with nothing stored, from its start; and once more in
-        the same process [s].
+        Time of the processor and by the clock: in a new process with nothing stored, from its start; and solved once
+        more in the same process [s].
     memory_mb : float or None
         Peak of the process [MB].
     """
@@ -254,11 +255,12 @@ def _started_s(done: Sequence[Run]) -> float:
 
 
 def _from(runs: Sequence[Run]) -> Iterator[Reference]:
-    """References: the narrowest bounds, and the finest answer of each program with its last change as its doubt."""
-    bounds = [(run.timed.answer.stated or 0.0, run) for run in runs if run.timed.answer.certified]
-    if bounds:
-        width, run = min(bounds, key=lambda each: each[0])
-        yield Reference(f"the bounds of {run.series.model}", OWN, run.timed.answer.value, max(width, DIGITS))
+    """References: the narrowest bounds and the finest answer of each program, with its last change as its doubt."""
+    certified = [run for run in runs if run.timed.answer.certified]
+    for program, bounds in by_key((run.series.program, run) for run in certified).items():
+        run = min(bounds, key=lambda run: run.timed.answer.stated or 0.0)
+        doubt = max(run.timed.answer.stated or 0.0, DIGITS)
+        yield Reference(f"the bounds of {run.series.model}", program, run.timed.answer.value, doubt)
     for series, levels in groupby(runs, key=lambda run: run.series):
         yield from _finest(series, [run.timed.answer for run in levels])
 

@@ -32,10 +32,14 @@ def formula(name: str, params: Any, eps_r: float, area_m2: float) -> ModelAnswer
 
 
 def peer(name: str, scene: "Scene", permittivity: Mapping[str, float], level: int, count: float) -> ModelAnswer:
-    """Capacitance of the whole sensor [F] by another program."""
+    """Capacitance of the whole sensor [F] by another program, certified where it gives bounds."""
+    from sensorgen.core.bounds import Interval
     from sensorgen.verification import peers
 
-    return ModelAnswer((count * peers.levels(name, scene, permittivity)[level][1](),))
+    value = peers.levels(name, scene, permittivity)[level][1]()
+    if isinstance(value, Interval):
+        return ModelAnswer((count * value.middle(),), value.width() / 2, certified=True)
+    return ModelAnswer((count * value,))
 
 
 def rise_by_law(body: "Body", law: str, stress_pa: float) -> ModelAnswer:

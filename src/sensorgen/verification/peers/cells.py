@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from sensorgen.core.arrays import Real, Whole
+from sensorgen.scene.connections import groups
 from sensorgen.scene.repetition import Slice, cell
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import ROUNDING_MM, Section, sections
@@ -16,7 +17,8 @@ from sensorgen.solvers.electrostatics.boxes import Grid, grid
 
 Vertex = tuple[float, float]
 Edge = tuple[Vertex, Vertex]
-ENDS = ("bottom", "top")
+ENDS, MIRRORS = ("bottom", "top"), ("left", "right")
+_STRAIGHT = 1e-12  # 1 less the cosine of an angle that is none
 RATIO = 0.15  # of a layer's distance from an edge to the next one's
 
 
@@ -48,14 +50,36 @@ class PlaneSection:
     faces: dict[Edge, tuple[str, str]]
     depth_mm: float
 
-    def electrode_edges(self) -> dict[Edge, str]:
-        """Edges of dielectrics on an electrode, and which one."""
-        by_edge = {}
-        for edge, sides in self.faces.items():
+    def _number(self) -> dict[Vertex, int]:
+        return {(u, v): k for k, (u, v) in enumerate(self.points_mm.tolist())}
+
+    def border(self) -> dict[str, list[tuple[int, int]]]:
+        """Edges of the triangles, by the points' numbers, on each electrode and on each mirror: "left" and "right"."""
+        number, first = self._number(), self.points_mm[:, 0].min()
+        edges: dict[str, list[tuple[int, int]]] = {name: [] for name in (*ENDS, *MIRRORS)}
+        for (a, b), sides in self.faces.items():
             ends = [s for s in sides if s in ENDS]
-            if len(ends) == 1 and all(sides):
-                by_edge[edge] = ends[0]
-        return by_edge
+            if a in number and b in number and len(ends) + sides.count("") == 1:
+                name = ends[0] if ends else MIRRORS[int(max(a[0], b[0]) - first > ROUNDING_MM)]
+                edges[name].append((number[a], number[b]))
+        return edges
+
+    def corners(self) -> list[int]:
+        """Numbers of the points at which materials, electrodes and mirrors meet other than in a straight line."""
+        number = self._number()
+        around: dict[Vertex, list[tuple[frozenset[str], float]]] = defaultdict(list)
+        for (a, b), sides in self.faces.items():
+            if sides[0] != sides[1]:
+                angle = float(np.arctan2(b[1] - a[1], b[0] - a[0]))
+                around[a].append((frozenset(sides), angle))
+                around[b].append((frozenset(sides), angle + np.pi))
+        return [number[p] for p, lines in around.items() if p in number and not _is_straight(lines)]
+
+
+def _is_straight(lines: list[tuple[frozenset[str], float]]) -> bool:
+    """Test whether the lines at a point are one straight line between the same two sides."""
+    (one, at), *others = lines
+    return [side for side, _ in others] == [one] and abs(np.cos(at - others[0][1]) + 1) < _STRAIGHT
 
 
 def geometry(scene: Scene) -> PlaneSection | Grid:
@@ -78,20 +102,31 @@ def _plane(section: Section, height_mm: float) -> PlaneSection:
     """The cell of a cross-section, its bands cut into triangles around their middles."""
     piece = cell(section, height_mm)
     heights = _heights(piece.slices)
-    points: dict[Vertex, int] = {}
-    triangles, materials, shares = [], [], []
+    fans: list[tuple[str, list[Vertex], float]] = []
     faces: dict[Edge, tuple[str, str]] = {}
+    beside: dict[Edge, list[int]] = defaultdict(list)  # fans of dielectric
     for part, often in zip(piece.slices, piece.shares, strict=True):
         for name, outline in _polygons(part, heights):
-            middle = (sum(u for u, _ in outline) / len(outline), sum(v for _, v in outline) / len(outline))
             for a, b in pairwise([*outline, outline[0]]):
                 edge = (a, b) if a < b else (b, a)
                 left, right = faces.get(edge, ("", ""))
                 faces[edge] = (name, right) if a < b else (left, name)
                 if name not in ENDS:
-                    triangles.append([points.setdefault(p, len(points)) for p in (middle, a, b)])
-                    materials.append(name)
-                    shares.append(often)
+                    beside[edge].append(len(fans))
+            if name not in ENDS:
+                fans.append((name, outline, often))
+    pairs = np.array([pair for pair in beside.values() if len(pair) == 2], np.int64).reshape(-1, 2)
+    group = groups(len(fans), *pairs.T)
+    at_ends = ({int(group[k]) for edge, (k, *_) in beside.items() if end in faces[edge]} for end in ENDS)
+    carrying = set.intersection(*at_ends)  # a cover over an electrode carries no field
+    points: dict[Vertex, int] = {}
+    triangles, materials, shares = [], [], []
+    for (name, outline, often), number in zip(fans, group.tolist(), strict=True):
+        middle = (sum(u for u, _ in outline) / len(outline), sum(v for _, v in outline) / len(outline))
+        for a, b in pairwise([*outline, outline[0]]) if number in carrying else ():
+            triangles.append([points.setdefault(p, len(points)) for p in (middle, a, b)])
+            materials.append(name)
+            shares.append(often)
     return PlaneSection(
         np.array(list(points)), np.array(triangles), tuple(materials), np.array(shares), faces, section.depth_mm
     )
