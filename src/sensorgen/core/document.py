@@ -19,7 +19,7 @@ Cell = str | float | int | None
 DIGITS = 4  # for people; files for programs hold all
 WIDTH = 80  # columns of a terminal
 _LEAST = 20  # columns into which words are wrapped
-MOST_ROWS = 2000  # of a table in HTML: a browser has to lay out all of them
+MOST_ROWS = 500  # of a table in HTML: a browser has to load and lay out all of them, and no one reads more
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "\\`*_{}[]<>#|!~$&"})
 _NAMES = ("specimen", "name")  # of the column that names a row, else the first
 _wrapped = partial(textwrap.wrap, width=WIDTH, break_on_hyphens=False, break_long_words=False)  # names stay whole
@@ -300,7 +300,7 @@ def _html(part: Part) -> str:
         return _tag("p", part)
     if isinstance(part, Facts):
         return _scrolled(_row(_tag("td", name), _tag("td", words)) for name, words in part.rows)
-    table, caption, count = replace(part, cells=part.cells[:MOST_ROWS]).filled(), part.caption, len(part.cells)
+    table, caption, count = replace(part, cells=tuple(part.cells[:MOST_ROWS])).filled(), part.caption, len(part.cells)
     if count > MOST_ROWS:
         caption += f" (the first {MOST_ROWS} of {count} rows; CSV has all)"
     return _scrolled(_html_list(table) if count == 1 else _html_rows(table), caption, part.key)

@@ -9,6 +9,7 @@ from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.report.alternating import BAKED, F_PER_PF, AcRow, at_text
 from sensorgen.core.document import Cell, Column
 from sensorgen.core.errors import BadInput
+from sensorgen.core.lazy import Lazy
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log import Log
 
@@ -101,7 +102,7 @@ class HistoryRow:
     verdict: Annotated[str, Column("verdict")]
 
 
-def rows(comparison: Comparison, ac: Sequence[AcRow]) -> list[HistoryRow]:
+def rows(comparison: Comparison, ac: Sequence[AcRow]) -> Lazy[HistoryRow]:
     """A row for each reading of which a bake, shrinkage, a defect or a remark is known and new."""
     measured: dict[int, dict[float, tuple[float, float]]] = {}
     for one in ac:
@@ -118,7 +119,7 @@ def rows(comparison: Comparison, ac: Sequence[AcRow]) -> list[HistoryRow]:
             listed.append(_row(row, change, shrinkage))
             c_pf = {}
         before[name] = row, c_pf | {f: pf for f, (pf, _) in c.items()}
-    return listed
+    return Lazy(listed.__getitem__, range(len(listed)))
 
 
 def _state(row: Compared) -> tuple[bool | None, str, str]:
