@@ -269,6 +269,7 @@ def report_command(
         Show the page in the browser.
     """
     from sensorgen.analysis.report import STEPS, pieces, report
+    from sensorgen.core import document, files
 
     how = how or _form(output)
     if show_it and (how != "html" or output == "-"):
@@ -281,7 +282,9 @@ def report_command(
         render.write(pieces(compared, how))
         return
     path = Path(output or f"report-{_which(compared, iteration)}.{how}")
-    _write(compared, path, how)
+    with files.replacing(path) as target:
+        target.writelines(piece.encode() for piece in pieces(compared, how))
+    render.write(f"{line}\n" for line in document.text([*compared.headline, str(path)]))
     if show_it:
         webbrowser.open(path.resolve().as_uri())
 
@@ -298,16 +301,6 @@ def _which(compared: "Report", iteration: int | None) -> str:
     if iteration is not None:
         return str(iteration)
     return re.sub(r"\W+", "-", compared.specimens[0]) if compared.specimens else "all"
-
-
-def _write(compared: "Report", path: Path, how: str) -> None:
-    """Write the file, and print the headline and its name."""
-    from sensorgen.analysis.report import pieces
-    from sensorgen.core import document, files
-
-    with files.replacing(path) as target:
-        target.writelines(piece.encode() for piece in pieces(compared, how))
-    render.write(f"{line}\n" for line in document.text([*compared.headline, str(path)]))
 
 
 def _draw(compared: "Report", folder: Path) -> None:

@@ -122,10 +122,8 @@ class Table:
 
     def filled(self) -> "Table":
         """The table for people: without hidden columns, and those that are empty in every row."""
-        shown_columns = [
-            k for k, column in enumerate(self.columns)
-            if not column.hidden and any(row[k] not in (None, "") for row in self.cells)
-        ]  # fmt: skip
+        used = {k for row in self.cells for k, cell in enumerate(row) if cell not in (None, "")}
+        shown_columns = [k for k, column in enumerate(self.columns) if k in used and not column.hidden]
         cells = _each(self.cells, lambda row: tuple(row[k] for k in shown_columns))
         return replace(self, columns=tuple(self.columns[k] for k in shown_columns), cells=cells)
 

@@ -184,18 +184,18 @@ def _explained(kind: MeasurementKind, parameter: str) -> Explanation:
     start, unit = (0.0, "S") if parameter == LEAK else (1.0, "factor")
     low, high = np.log(_LEAK_S if parameter == LEAK else _FACTOR)
 
-    def left(at: float) -> float:
+    def left(value: float) -> float:
         try:
-            return float((np.abs(kind.measured - kind.model(parameter, exp(at))) ** 2).sum())
+            residual = kind.measured - kind.model(parameter, value)
+            return float(np.vdot(residual, residual).real)
         except SensorgenError:  # loads that a film so soft cannot bear
             return inf
 
-    before = float((np.abs(kind.measured - kind.model(parameter, start)) ** 2).sum())
-    grid = np.linspace(low, high, _GRID)
-    sums = [left(at) for at in grid]
+    before, grid = left(start), np.linspace(low, high, _GRID)
+    sums = [left(exp(at)) for at in grid]
     best = int(np.argmin(sums))
     around = grid[max(best - 1, 0)], grid[min(best + 1, _GRID - 1)]
-    done = minimize_scalar(left, bounds=around, method="bounded", options={"xatol": 1e-7})
+    done = minimize_scalar(lambda at: left(exp(at)), bounds=around, method="bounded", options={"xatol": 1e-7})
     at, least = min((float(done.x), float(done.fun)), (float(grid[best]), sums[best]), key=lambda pair: pair[1])
     share = 1 - least / before if before > 0 else 0.0
     if share < _FLAT:

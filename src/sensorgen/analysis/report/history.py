@@ -2,6 +2,7 @@
 
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -107,19 +108,18 @@ def rows(comparison: Comparison, ac: Sequence[AcRow]) -> Lazy[HistoryRow]:
     measured: dict[int, dict[float, tuple[float, float]]] = {}
     for one in ac:
         measured.setdefault(one.number, {})[one.frequency_hz] = one.c_pf, one.c_ratio
+    shrinkages = {name: body.design.shrinkage for name, body in comparison.bodies.items()}
     listed, before = [], dict[str, tuple[Compared, dict[float, float]]]()  # the reading before, C in its state [pF]
     for row in comparison.rows:
         name = row.reading.specimen
-        body = comparison.bodies.get(comparison.names.get(name, ""))
-        shrinkage = body.design.shrinkage if body else 0.0
+        shrinkage = shrinkages.get(comparison.names.get(name, ""), 0.0)
         was, c_pf = before.get(name, (None, dict[float, float]()))
         c, state = measured.get(row.reading.number, {}), _state(row)
         if (state != _UNTOLD or shrinkage) and (was is None or state != _state(was)):
-            change = _since(row, was, c_pf, c) if was else _by_prediction(row, c)
-            listed.append(_row(row, change, shrinkage))
+            listed.append(partial(_row, row, was, c_pf, c, shrinkage))
             c_pf = {}
         before[name] = row, c_pf | {f: pf for f, (pf, _) in c.items()}
-    return Lazy(listed.__getitem__, range(len(listed)))
+    return Lazy(lambda k: listed[k](), range(len(listed)))
 
 
 def _state(row: Compared) -> tuple[bool | None, str, str]:
@@ -127,8 +127,10 @@ def _state(row: Compared) -> tuple[bool | None, str, str]:
     return words.baked, words.defects, words.remark
 
 
-def _row(row: Compared, change: "_Change", shrinkage: float) -> HistoryRow:
-    words = row.reading.words
+def _row(
+    row: Compared, was: Compared | None, pf: dict[float, float], c: dict[float, tuple[float, float]], shrinkage: float
+) -> HistoryRow:
+    words, change = row.reading.words, _since(row, was, pf, c) if was else _by_prediction(row, c)
     lowest, bake = min(change.c, default=None), "" if words.baked is None else BAKED[words.baked]
     return HistoryRow(
         row.reading.number, row.reading.specimen, bake, 100 * shrinkage or None, words.defects,
@@ -168,7 +170,7 @@ def _ratio(now: float, before: float) -> float:
 
 def findings(rows: Sequence[HistoryRow]) -> Iterator[str]:
     """Sentences about changes by bakes and defects, where one specimen has them."""
-    if len({row.specimen for row in rows}) > 1:
+    if any(row.specimen != rows[0].specimen for row in rows):
         return
     for row in rows:
         changes = {

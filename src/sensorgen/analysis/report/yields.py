@@ -342,13 +342,12 @@ def rank_p(one: Sequence[float], other: Sequence[float]) -> float:
     >>> round(rank_p([0.68, 0.6, 0.63, 0.67, 0.68], [0.36, 0.435, 0.5, 0.5, 0.45]), 6)  # 2 of 252
     0.007937
     """
-    n, m = len(one), len(other)
-    _, places, ties = np.unique((*one, *other), return_inverse=True, return_counts=True)
-    ranks = (np.cumsum(ties) - (ties - 1) / 2)[places]
+    both, n, count = np.array([*one, *other]), len(one), len(one) + len(other)
+    ordered = np.sort(both)
+    ranks = (ordered.searchsorted(both) + ordered.searchsorted(both, "right") - count) / 2  # from their mean
     score = ranks[:n].sum()
-    if comb(n + m, n) <= _ORDERS:
-        scores = ranks[np.array([*combinations(range(n + m), n)])].sum(axis=1)
+    if comb(count, n) <= _ORDERS:
+        scores = ranks[np.array([*combinations(range(count), n)])].sum(axis=1)
         return float(min(1.0, 2 * min((scores <= score).mean(), (scores >= score).mean())))
-    variance = n * m / 12 * (n + m + 1 - (ties**3 - ties).sum() / ((n + m) * (n + m - 1)))
-    off = abs(score - n * (n + m + 1) / 2) - 0.5
-    return min(1.0, erfc(off / sqrt(2 * variance))) if variance else 1.0
+    variance = n * (count - n) / (count - 1) * ranks.var()
+    return min(1.0, erfc((abs(score) - 0.5) / sqrt(2 * variance))) if variance else 1.0
