@@ -8,7 +8,7 @@ the part of that sum that it takes away.
 from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from itertools import groupby
 from math import exp, inf, log, nan, sqrt
 from typing import Annotated, Any
@@ -29,7 +29,7 @@ RESISTIVITY, PERMITTIVITY, MODULUS, FILM, LEAK = PARAMETERS = (
     "electrode resistivity", "film permittivity", "all moduli", "film thickness", "film leakage",
 )  # fmt: skip
 _FACTOR, _LEAK_S = (1e-2, 1e2), (1e-12, 1e3)
-_GRID = 31
+_GRID, _CLOSE = 31, 1e-7  # values of a parameter at first, and the step in its ln at last
 _STEP = 1e-3
 _OPEN = log(1e6)  # a larger factor is shown as this one: nothing is known
 _FLAT = 1e-9  # share below which a parameter has no effect
@@ -179,24 +179,23 @@ def _moves(of: Movable, parameter: str, value: float) -> dict[str, float]:
 
 
 def _explained(kind: MeasurementKind, parameter: str) -> Explanation:
-    from scipy.optimize import minimize_scalar
-
     start, unit = (0.0, "S") if parameter == LEAK else (1.0, "factor")
     low, high = np.log(_LEAK_S if parameter == LEAK else _FACTOR)
 
-    def left(value: float) -> float:
+    @cache
+    def left(at: float) -> float:
         try:
-            residual = kind.measured - kind.model(parameter, value)
+            residual = kind.measured - kind.model(parameter, exp(at))
             return float(np.vdot(residual, residual).real)
         except SensorgenError:  # loads that a film so soft cannot bear
             return inf
 
-    before, grid = left(start), np.linspace(low, high, _GRID)
-    sums = [left(exp(at)) for at in grid]
-    best = int(np.argmin(sums))
-    around = grid[max(best - 1, 0)], grid[min(best + 1, _GRID - 1)]
-    done = minimize_scalar(lambda at: left(exp(at)), bounds=around, method="bounded", options={"xatol": 1e-7})
-    at, least = min((float(done.x), float(done.fun)), (float(grid[best]), sums[best]), key=lambda pair: pair[1])
+    grid = np.linspace(low, high, _GRID).tolist()
+    at, step, before = min(grid, key=left), grid[1] - grid[0], left(log(start) if start else -inf)
+    while step > _CLOSE:
+        step /= 2
+        at = min((max(at - step, low), at, min(at + step, high)), key=left)
+    least = left(at)
     share = 1 - least / before if before > 0 else 0.0
     if share < _FLAT:
         slope = _slope(kind, parameter, log(start)) if start else 0.0
