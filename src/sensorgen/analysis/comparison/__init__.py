@@ -374,7 +374,7 @@ def _intact_ohm(of: Predicted | None, instrument: str) -> float:
 
 
 def _unused(rows: Iterable[Compared], alternating: Container[int]) -> Iterator[tuple[str, str]]:
-    """What a reading cannot be used for, and why; what another one of its specimen adds is not missing."""
+    """Readings that are of no use or of little, and why; what another one of the specimen adds is not missing."""
     for row in rows:
         number, y, z, words = row.reading
         name = f"reading {number}, {words.specimen}"
@@ -384,7 +384,7 @@ def _unused(rows: Iterable[Compared], alternating: Container[int]) -> Iterator[t
             continue
         if row.verdict.word == "unknown" and not (y and z):
             why = f"no {'R_Z' if y else 'R_Y'}: counts for nothing where both are needed"
-            yield name, why if y or z else "no measurement in it"
+            yield name, why if y != z else "no measurement in it"
         if min(*y, *z, 0.0, 0.0) < 0:
             yield name, "a resistance below 0 is no reading"
 

@@ -5,7 +5,7 @@ frequency, complex where Z is. One parameter is moved for all of them until :mat
 the part of that sum that it takes away.
 """
 
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
@@ -79,14 +79,10 @@ def sentences(explanations: Sequence[Explanation]) -> Iterator[str]:
             by = f"of {best.value:.3g} S" if best.parameter == LEAK else f"scaled by {best.value:.3g}"
             share = f"{best.share_percent:.3g} % of the squared residuals"
             yield f"{kind.capitalize()}: {best.parameter} {by} explains {share}."
-    if explanations:
-        yield from _unconstrained({e.parameter for e in explanations if not e.share_percent <= 100 * _FLAT})
-
-
-def _unconstrained(constrained: Container[str]) -> Iterator[str]:
-    *first, last = ["", *(p for p in PARAMETERS if p not in constrained)]
-    if last:
-        yield f"These readings cannot constrain {' or '.join(filter(None, (', '.join(first[1:]), last)))}."
+    constrained = {e.parameter for e in explanations if not e.share_percent <= 100 * _FLAT}
+    others = [p for p in PARAMETERS if p not in constrained]
+    if explanations and others:
+        yield f"These readings cannot constrain {' or '.join(filter(None, (', '.join(others[:-1]), others[-1])))}."
 
 
 def _resistances(comparison: Comparison) -> Iterator[MeasurementKind]:

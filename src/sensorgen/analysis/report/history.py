@@ -10,7 +10,7 @@ from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.report.alternating import BAKED, F_PER_PF, AcRow, at_text
 from sensorgen.core.document import Cell, Column
 from sensorgen.core.errors import BadInput
-from sensorgen.core.lazy import Lazy
+from sensorgen.core.lazy import Lazy, by_key
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log import Log
 
@@ -81,6 +81,7 @@ def calibration_findings(calibrations: "Sequence[Calibration]") -> Iterator[str]
         yield from (f"{one.specimen}: {note}." for note in one.notes)
 
 
+_ByFrequency = dict[float, tuple[float, float]]  # C [pF], and its ratio to the predicted one
 _UNTOLD = None, "", ""  # bake, defects and remark of a reading of which none is known
 
 
@@ -105,16 +106,15 @@ class HistoryRow:
 
 def rows(comparison: Comparison, ac: Sequence[AcRow]) -> Lazy[HistoryRow]:
     """A row for each reading of which a bake, shrinkage, a defect or a remark is known and new."""
-    measured: dict[int, dict[float, tuple[float, float]]] = {}
-    for one in ac:
-        measured.setdefault(one.number, {})[one.frequency_hz] = one.c_pf, one.c_ratio
+    measured = by_key((one.number, one) for one in ac)
     shrinkages = {name: body.design.shrinkage for name, body in comparison.bodies.items()}
     listed, before = [], dict[str, tuple[Compared, dict[float, float]]]()  # the reading before, C in its state [pF]
     for row in comparison.rows:
         name = row.reading.specimen
         shrinkage = shrinkages.get(comparison.names.get(name, ""), 0.0)
         was, c_pf = before.get(name, (None, dict[float, float]()))
-        c, state = measured.get(row.reading.number, {}), _state(row)
+        c = {one.frequency_hz: (one.c_pf, one.c_ratio) for one in measured.get(row.reading.number, ())}
+        state = _state(row)
         if (state != _UNTOLD or shrinkage) and (was is None or state != _state(was)):
             listed.append(partial(_row, row, was, c_pf, c, shrinkage))
             c_pf = {}
@@ -127,10 +127,8 @@ def _state(row: Compared) -> tuple[bool | None, str, str]:
     return words.baked, words.defects, words.remark
 
 
-def _row(
-    row: Compared, was: Compared | None, pf: dict[float, float], c: dict[float, tuple[float, float]], shrinkage: float
-) -> HistoryRow:
-    words, change = row.reading.words, _since(row, was, pf, c) if was else _by_prediction(row, c)
+def _row(row: Compared, was: Compared | None, pf: dict[float, float], c: _ByFrequency, shrinkage: float) -> HistoryRow:
+    words, change = row.reading.words, _since(row, was, pf, c)
     lowest, bake = min(change.c, default=None), "" if words.baked is None else BAKED[words.baked]
     return HistoryRow(
         row.reading.number, row.reading.specimen, bake, 100 * shrinkage or None, words.defects,
@@ -150,18 +148,16 @@ class _Change(NamedTuple):
     baked: bool = False
 
 
-def _since(row: Compared, was: Compared, pf: dict[float, float], c: dict[float, tuple[float, float]]) -> _Change:
+def _since(row: Compared, was: Compared | None, pf: dict[float, float], c: _ByFrequency) -> _Change:
+    if was is None:
+        expected = row.predicted.ry_ohm if row.predicted else None
+        electrode = _ratio(row.verdict.ry_ohm, expected.value if expected else nan)
+        return _Change("prediction", electrode, nan, {f: ratio for f, (_, ratio) in c.items()})
     now, then = row.verdict, was.verdict
     baked = bool(was.reading.words.baked is False and row.reading.words.baked)
     ratios = {f: value / pf[f] for f, (value, _) in c.items() if f in pf}
     electrode, film = _ratio(now.ry_ohm, then.ry_ohm), _ratio(now.rz_ohm, then.rz_ohm)
     return _Change(f"reading {was.reading.number}", electrode, film, ratios, baked)
-
-
-def _by_prediction(row: Compared, c: dict[float, tuple[float, float]]) -> _Change:
-    expected = row.predicted.ry_ohm if row.predicted else None
-    electrode = _ratio(row.verdict.ry_ohm, expected.value if expected else nan)
-    return _Change("prediction", electrode, nan, {f: ratio for f, (_, ratio) in c.items()})
 
 
 def _ratio(now: float, before: float) -> float:
