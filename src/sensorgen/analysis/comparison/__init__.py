@@ -201,7 +201,7 @@ def _partners(rows: Iterable[Measured]) -> dict[int, int]:
     partner, latest = dict[int, int](), dict[tuple[str, bool | None, bool], int]()
     waiting: dict[tuple[str, bool | None, bool], list[int]] = defaultdict(list)
     for place, reading in enumerate(rows):
-        known = [max(values, default=-1.0) >= 0 for values in (reading.y_ohm, reading.z_ohm)]
+        known = max(reading.y_ohm, default=-1.0) >= 0, max(reading.z_ohm, default=-1.0) >= 0
         for along, has, other in ((True, *known), (False, *known[::-1])):
             key = reading.specimen, reading.words.baked, along
             if has:

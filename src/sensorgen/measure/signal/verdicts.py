@@ -267,7 +267,7 @@ def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> SignalVerdict:
         raise OutOfRange(f"{of.name}: {of.expected_ohm:g} ohm expected of an electrode; expected a number above 0")
     if any(map(isnan, (*of.ry_ohm, *of.rz_ohm))):
         raise OutOfRange(f"{of.name}: readings {of.ry_ohm} and {of.rz_ohm} ohm; expected numbers, or none")
-    ry, rz = (max(min(values, default=nan), 0.0) for values in (of.ry_ohm, of.rz_ohm))  # nan stays nan, being first
+    ry, rz = max(min(of.ry_ohm, default=nan), 0.0), max(min(of.rz_ohm, default=nan), 0.0)  # nan stays, being first
     electrode, why_electrode = _electrode(of, ry)
     film, why_film = _film(ry, rz, of.expected_ohm, intact_ohm)
     known = not isnan(rz) and 0 <= ry < inf
