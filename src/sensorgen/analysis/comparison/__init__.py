@@ -153,7 +153,7 @@ def of_iteration(
         Names of specimens, in place of an iteration.
     """
     measured = readings(log.about(Reading, iteration, specimens))
-    logged = _held(measured.rows)
+    logged = _in_memory(measured.rows)
     left_out = list(_superseded(log, iteration, specimens))
     printed = _printed(log, left_out)
     refused = dict[str, str]()
@@ -183,12 +183,12 @@ def of_iteration(
             both = evidence._replace(ry_ohm=evidence.ry_ohm or other.ry_ohm, rz_ohm=evidence.rz_ohm or other.rz_ohm)
         return _beside(reading, of, evidence, verdict(both, _intact_ohm(of, reading.words.instrument)))
 
-    rows = _held(Lazy(compared, range(len(logged))))
+    rows = _in_memory(Lazy(compared, range(len(logged))))
     ac = {reading.number for reading in measured.alternating}
     return Comparison(rows, measured.alternating, built, names, expected, (*left_out, *_first(_unused(rows, ac))))
 
 
-def _held(rows: Lazy[Row]) -> Lazy[Row]:
+def _in_memory(rows: Lazy[Row]) -> Lazy[Row]:
     """Rows, made once where memory has room for all of them."""
     return Lazy([*rows].__getitem__, range(len(rows))) if len(rows) <= _MOST_HELD else rows
 
@@ -198,18 +198,20 @@ def _partners(rows: Iterable[Measured]) -> dict[int, int]:
 
     The latest before it counts, else the next.
     """
-    partner, latest = dict[int, int](), dict[tuple[str, bool | None, bool], int]()
-    waiting: dict[tuple[str, bool | None, bool], list[int]] = defaultdict(list)
+    partner, latest = dict[int, int](), dict[tuple[str, bool | None, int], int]()
+    waiting: dict[tuple[str, bool | None, int], list[int]] = defaultdict(list)
     for place, reading in enumerate(rows):
         known = max(reading.y_ohm, default=-1.0) >= 0, max(reading.z_ohm, default=-1.0) >= 0
-        for along, has, other in ((True, *known), (False, *known[::-1])):
-            key = reading.specimen, reading.words.baked, along
+        words = reading.words
+        for k, has in enumerate(known):
+            key = words.specimen, words.baked, k
             if has:
                 latest[key] = place
-                partner |= dict.fromkeys(waiting.pop(key, ()), place)
-            elif other and key in latest:
+                if key in waiting:
+                    partner |= dict.fromkeys(waiting.pop(key), place)
+            elif known[1 - k] and key in latest:
                 partner[place] = latest[key]
-            elif other:
+            elif known[1 - k]:
                 waiting[key].append(place)
     return partner
 

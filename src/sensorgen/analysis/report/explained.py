@@ -29,23 +29,23 @@ RESISTIVITY, PERMITTIVITY, MODULUS, FILM, LEAK = PARAMETERS = (
     "electrode resistivity", "film permittivity", "all moduli", "film thickness", "film leakage",
 )  # fmt: skip
 _FACTOR, _LEAK_S = (1e-2, 1e2), (1e-12, 1e3)
-_GRID, _CLOSE = 31, 1e-7  # values of a parameter at first, and the step in its ln at last
+_GRID, _CLOSE = 31, 1e-6  # values of a parameter at first, and the step in its ln at last
 _STEP = 1e-3
 _OPEN = log(1e6)  # a larger factor is shown as this one: nothing is known
 _FLAT = 1e-9  # share below which a parameter has no effect
 
-Model = Callable[[str, float], Complex]
+Model = Callable[[str, float], Real | Complex]
 
 
 @dataclass(frozen=True, eq=False)
 class MeasurementKind:
-    """A kind of measurement: ln of the measured values, and of the predicted ones with one parameter moved.
+    """A kind of measurement: ln of the measured values, real or complex, and of the predicted, one parameter moved.
 
     A leakage of 0 and a factor of 1 are the prediction itself.
     """
 
     name: str
-    measured: Complex
+    measured: Real | Complex
     model: Model
 
 
@@ -95,11 +95,10 @@ def _resistances(comparison: Comparison) -> Iterator[MeasurementKind]:
     kind = np.dtype([(name, "f8") for name in ("y", "z", "expected", "alone", "leak")] + [("apart", "?")])
     known = np.fromiter(rows, kind)
     if len(known):
-        yield MeasurementKind("electrode resistance", np.log(known["y"]).astype(complex), _along(known))
+        yield MeasurementKind("electrode resistance", np.log(known["y"]), _along(known))
     both = known[(known["z"] > 0) & known["apart"]]
     if len(both):
-        measured = np.log(np.minimum(both["z"], INTACT_OHM)).astype(complex)
-        yield MeasurementKind("film resistance", measured, _across(both["alone"]))
+        yield MeasurementKind("film resistance", np.log(np.minimum(both["z"], INTACT_OHM)), _across(both["alone"]))
 
 
 def _along(known: Any) -> Model:
@@ -107,9 +106,9 @@ def _along(known: Any) -> Model:
     leak, expected = np.nan_to_num(known["leak"], posinf=np.inf), np.log(known["expected"])
     measured = np.log(_carried(known["alone"], leak))
 
-    def model(parameter: str, value: float) -> Complex:
+    def model(parameter: str, value: float) -> Real:
         more = np.log(_carried(known["alone"], leak + value)) - measured if parameter == LEAK else 0.0
-        return np.asarray(expected + more + (log(value) if parameter == RESISTIVITY else 0.0) + 0j)
+        return np.asarray(expected + more + (log(value) if parameter == RESISTIVITY else 0.0))
 
     return model
 
@@ -124,9 +123,9 @@ def _across(alone: Real) -> Model:
     """Ln of predicted readings across a film, once for electrodes that are alike: many readings are of few designs."""
     distinct, of = np.unique(alone, return_inverse=True)
 
-    def model(parameter: str, value: float) -> Complex:
+    def model(parameter: str, value: float) -> Real:
         leak = value if parameter == LEAK else 0.0
-        return np.asarray(np.log([complex(min(across_ohm(ohm, leak), INTACT_OHM)) for ohm in distinct.tolist()])[of])
+        return np.asarray(np.log([min(across_ohm(ohm, leak), INTACT_OHM) for ohm in distinct.tolist()])[of])
 
     return model
 

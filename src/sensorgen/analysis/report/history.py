@@ -82,7 +82,8 @@ def calibration_findings(calibrations: "Sequence[Calibration]") -> Iterator[str]
 
 
 _ByFrequency = dict[float, tuple[float, float]]  # C [pF], and its ratio to the predicted one
-_UNTOLD = None, "", ""  # bake, defects and remark of a reading of which none is known
+_State = tuple[bool | None, str, str]  # bake, defects and remark
+_UNTOLD = None, "", ""  # of a reading of which none is known
 
 
 @dataclass(frozen=True)
@@ -108,23 +109,18 @@ def rows(comparison: Comparison, ac: Sequence[AcRow]) -> Lazy[HistoryRow]:
     """A row for each reading of which a bake, shrinkage, a defect or a remark is known and new."""
     measured = by_key((one.number, one) for one in ac)
     shrinkages = {name: body.design.shrinkage for name, body in comparison.bodies.items()}
-    listed, before = [], dict[str, tuple[Compared, dict[float, float]]]()  # the reading before, C in its state [pF]
+    listed, before = [], dict[str, tuple[Compared, _State, dict[float, float]]]()  # the last, its state, C in it [pF]
     for row in comparison.rows:
         name = row.reading.specimen
         shrinkage = shrinkages.get(comparison.names.get(name, ""), 0.0)
-        was, c_pf = before.get(name, (None, dict[float, float]()))
+        was, then, c_pf = before.get(name) or (None, None, {})
         c = {one.frequency_hz: (one.c_pf, one.c_ratio) for one in measured.get(row.reading.number, ())}
-        state = _state(row)
-        if (state != _UNTOLD or shrinkage) and (was is None or state != _state(was)):
+        state = row.reading.words.baked, row.reading.words.defects, row.reading.words.remark
+        if (state != _UNTOLD or shrinkage) and state != then:
             listed.append(partial(_row, row, was, c_pf, c, shrinkage))
             c_pf = {}
-        before[name] = row, c_pf | {f: pf for f, (pf, _) in c.items()}
+        before[name] = row, state, c_pf | {f: pf for f, (pf, _) in c.items()}
     return Lazy(lambda k: listed[k](), range(len(listed)))
-
-
-def _state(row: Compared) -> tuple[bool | None, str, str]:
-    words = row.reading.words
-    return words.baked, words.defects, words.remark
 
 
 def _row(row: Compared, was: Compared | None, pf: dict[float, float], c: _ByFrequency, shrinkage: float) -> HistoryRow:
