@@ -23,6 +23,7 @@ MOST_ROWS = 500  # of a table in HTML: a browser has to load and lay out all of 
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "\\`*_{}[]<>#|!~$&"})
 _NAMES = ("specimen", "name")  # of the column that names a row, else the first
 _wrapped = partial(textwrap.wrap, width=WIDTH, break_on_hyphens=False, break_long_words=False)  # names stay whole
+_APART = frozenset(',"\r\n')  # letters for which CSV quotes a cell
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "'", "＝", "＋", "－", "＠")
 
 
@@ -376,7 +377,7 @@ def apart(*blocks: Iterable[Part]) -> Iterator[Part]:
 
 def csv_row(cells: Iterable[str]) -> str:
     """Words as a row of CSV, quoted where they would come apart."""
-    quoted = ('"' + c.replace('"', '""') + '"' if any(mark in c for mark in ',"\r\n') else c for c in cells)
+    quoted = ('"' + c.replace('"', '""') + '"' if not _APART.isdisjoint(c) else c for c in cells)
     return ",".join(quoted) + "\n"
 
 
