@@ -55,6 +55,18 @@ def test_a_late_block_is_no_gap():
     assert found.clock.epoch_s == pytest.approx(made.EPOCH_S + 0.03, abs=0.002)
 
 
+@pytest.mark.parametrize("stamped", [False, True])
+@pytest.mark.parametrize(("seed", "uneven"), [(1, 0.0), (2, 0.05)])
+def test_rows_that_are_cut_out_leave_a_gap_in_a_time_that_rises(stamped, seed, uneven):
+    """The first sample after each cut, of a single row too, and no other, also where steps differ by a part."""
+    time = TIME + uneven / 140 * np.random.default_rng(seed).random(len(TIME))
+    left = np.delete(np.arange(len(TIME)), [500, *range(2000, 2150)])
+    found = rebuilt(len(left), time[left], made.stamps(TIME)[left] if stamped else None)
+    np.testing.assert_array_equal(found.time_s, time[left])
+    assert np.flatnonzero(found.marks["gap"]).tolist() == [500, 1999]
+    assert not rebuilt(len(TIME), time, None).marks["gap"].any()
+
+
 def test_a_time_that_does_not_rise_is_rebuilt_from_the_index():
     broken = TIME.copy()
     broken[100:110] = np.nan

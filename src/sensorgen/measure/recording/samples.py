@@ -288,6 +288,8 @@ def rebuilt(count: int, time_s: Real | None, stamp_s: Real | None) -> Rebuilt:
     time_s, stamp_s = (None if t is None else np.where(np.abs(t) < _LATEST_S, t, np.nan) for t in (time_s, stamp_s))
     even, notes = _even(count, time_s, stamp_s)
     marks = {name: np.zeros(count, bool) for name in ("gap", "reversed stamp", "repeated stamp", "no stamp")}
+    if count > 1:
+        marks["gap"][1:] = _too_long(np.diff(even))
     if stamp_s is None:
         return Rebuilt(even, RecordingClock(), marks, notes)
     steps = np.diff(stamp_s)
@@ -306,6 +308,13 @@ def rebuilt(count: int, time_s: Real | None, stamp_s: Real | None) -> Rebuilt:
             set_back[index:] += jump_s
             notes += (f"the computer's clock was set back by {-jump_s:.3g} s at sample {index + 1}",)
     return Rebuilt(even, _fitted(even[first], first_stamp - set_back[first]), marks, notes)
+
+
+def _too_long(steps_s: Real) -> Mask:
+    """Steps in which samples were lost: half a step and six standard deviations longer than usual, but no pause."""
+    more = steps_s - np.median(steps_s)
+    least = max(float(np.median(steps_s)) / 2, _OUTLIER * 1.4826 * float(np.median(np.abs(more))))
+    return np.asarray((more > least) & (steps_s <= PAUSE_S))
 
 
 def _even_by_time(count: int, time_s: Real) -> tuple[Real, tuple[str, ...]]:
