@@ -564,21 +564,34 @@ def under_tops(
         return solution.stress_pa[1:][np.isfinite(ratio)], ratio[np.isfinite(ratio)]
 
     few, curves = mesh_ladder.few(own.stress_pa), {tip.block: own} if not tip.soft else {}
-    of_mesh = over_own(tip.block, few)
-    for block in [top for top in TOPS if top != tip.block] if of_mesh[0].size else ():
+    of_mesh, blocks = over_own(tip.block, few), [top for top in TOPS if top != tip.block]
+    for block in blocks if of_mesh[0].size else ():
         for loads in (sorted({*few[:2], few[-1]}), own.stress_pa):
             at, ratio = over_own(block, loads)
             ratio = ratio / np.interp(at, *of_mesh)
             if len(at) == len(loads) - 1 and ratio.max() < _ALIKE * ratio.min():
                 break
-        if at.size:
-            known = stress[stress <= at.max()]
-            rises = rise[: len(known)] * np.interp(known, at, ratio)
-            end = 1 + int(np.argmin(np.append(np.diff(rises) > 0, False)))  # a coarse mesh may fall after a contact
-            if end > 1:
-                other = compression.curve(own.name, own.source, known[:end].tolist(), (1 + rises[:end]).tolist())
-                curves[block] = replace(other, within=own.within)
+        known = stress[stress <= max(at, default=-1.0)]
+        if known.size and (other := _rising(own, rise[: len(known)] * np.interp(known, at, ratio))):
+            curves[block] = other
     return curves
+
+
+def _rising(own: CapacitanceCurve, rise: Real) -> CapacitanceCurve | None:
+    """A curve of other rises, at the first pressures of a curve, as far as it rises; None if nowhere."""
+    end = 1 + int(np.argmin(np.append(np.diff(rise) > 0, False)))  # a coarse mesh may fall after a contact
+    ratio = (1 + rise[:end]).tolist()
+    return (
+        replace(compression.curve(own.name, own.source, own.stress_pa[:end], ratio), within=own.within)
+        if end > 1
+        else None
+    )
+
+
+def _few_pa(stress_pa: float) -> list[float]:
+    """A few pressures up to beyond one; to the usual last one, where it is far beyond that [Pa]."""
+    last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
+    return [last_pa * share for share in _FEW]
 
 
 def at_a_few_pressures(
@@ -620,8 +633,7 @@ def at_a_few_pressures(
         return law if law.bounded else None
     try:
         case = case_of(design, printed, model, tip)
-        last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
-        solution = pressed(case, [last_pa * share for share in _FEW], level)
+        solution = pressed(case, _few_pa(stress_pa), level)
         curve = curve_of(solution)
     except SensorgenError:
         return None

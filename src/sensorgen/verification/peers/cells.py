@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 
 from sensorgen.core.arrays import Real, Whole
-from sensorgen.scene.connections import groups
 from sensorgen.scene.repetition import Slice, cell
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import ROUNDING_MM, Section, sections
@@ -102,34 +101,30 @@ def _plane(section: Section, height_mm: float) -> PlaneSection:
     """The cell of a cross-section, its bands cut into triangles around their middles."""
     piece = cell(section, height_mm)
     heights = _heights(piece.slices)
-    fans: list[tuple[str, list[Vertex], float]] = []
+    points: dict[Vertex, int] = {}
+    triangles, materials, shares = [], [], []
     faces: dict[Edge, tuple[str, str]] = {}
-    beside: dict[Edge, list[int]] = defaultdict(list)  # fans of dielectric
     for part, often in zip(piece.slices, piece.shares, strict=True):
-        for name, outline in _polygons(part, heights):
+        for name, outline in _between(list(_polygons(part, heights))):
+            middle = (sum(u for u, _ in outline) / len(outline), sum(v for _, v in outline) / len(outline))
             for a, b in pairwise([*outline, outline[0]]):
                 edge = (a, b) if a < b else (b, a)
                 left, right = faces.get(edge, ("", ""))
                 faces[edge] = (name, right) if a < b else (left, name)
                 if name not in ENDS:
-                    beside[edge].append(len(fans))
-            if name not in ENDS:
-                fans.append((name, outline, often))
-    pairs = np.array([pair for pair in beside.values() if len(pair) == 2], np.int64).reshape(-1, 2)
-    group = groups(len(fans), *pairs.T)
-    at_ends = ({int(group[k]) for edge, (k, *_) in beside.items() if end in faces[edge]} for end in ENDS)
-    carrying = set.intersection(*at_ends)  # a cover over an electrode carries no field
-    points: dict[Vertex, int] = {}
-    triangles, materials, shares = [], [], []
-    for (name, outline, often), number in zip(fans, group.tolist(), strict=True):
-        middle = (sum(u for u, _ in outline) / len(outline), sum(v for _, v in outline) / len(outline))
-        for a, b in pairwise([*outline, outline[0]]) if number in carrying else ():
-            triangles.append([points.setdefault(p, len(points)) for p in (middle, a, b)])
-            materials.append(name)
-            shares.append(often)
+                    triangles.append([points.setdefault(p, len(points)) for p in (middle, a, b)])
+                    materials.append(name)
+                    shares.append(often)
     return PlaneSection(
         np.array(list(points)), np.array(triangles), tuple(materials), np.array(shares), faces, section.depth_mm
     )
+
+
+def _between(column: list[tuple[str, list[Vertex]]]) -> list[tuple[str, list[Vertex]]]:
+    """Bands of a column, from the bottom up, without covers under the bottom electrode and on the top one."""
+    low = [k for k, (name, _) in enumerate(column) if name == "bottom"]
+    high = [k for k, (name, _) in enumerate(column) if name == "top"]
+    return column[min(low, default=0) : max(high, default=len(column)) + 1]
 
 
 def _heights(slices: Iterable[Slice]) -> dict[float, set[float]]:
