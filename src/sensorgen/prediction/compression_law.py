@@ -571,21 +571,19 @@ def under_tops(
             ratio = ratio / np.interp(at, *of_mesh)
             if len(at) == len(loads) - 1 and ratio.max() < _ALIKE * ratio.min():
                 break
-        known = stress[stress <= max(at, default=-1.0)]
-        if known.size and (other := _rising(own, rise[: len(known)] * np.interp(known, at, ratio))):
-            curves[block] = other
+        if at.size:
+            known = stress[stress <= at.max()]
+            curves |= _rising(block, own, rise[: len(known)] * np.interp(known, at, ratio))
     return curves
 
 
-def _rising(own: CapacitanceCurve, rise: Real) -> CapacitanceCurve | None:
-    """A curve of other rises, at the first pressures of a curve, as far as it rises; None if nowhere."""
+def _rising(name: str, own: CapacitanceCurve, rise: Real) -> dict[str, CapacitanceCurve]:
+    """A curve of other rises at the first pressures of one, by its name, as far as it rises; none if nowhere."""
     end = 1 + int(np.argmin(np.append(np.diff(rise) > 0, False)))  # a coarse mesh may fall after a contact
-    ratio = (1 + rise[:end]).tolist()
-    return (
-        replace(compression.curve(own.name, own.source, own.stress_pa[:end], ratio), within=own.within)
-        if end > 1
-        else None
-    )
+    if end == 1:
+        return {}
+    curve = compression.curve(own.name, own.source, own.stress_pa[:end], (1 + rise[:end]).tolist())
+    return {name: replace(curve, within=own.within)}
 
 
 def _few_pa(stress_pa: float) -> list[float]:
