@@ -6,10 +6,11 @@ from hashlib import sha256
 
 import pytest
 
+from sensorgen.cli import designs
 from sensorgen.core.bounds import Bounds
 from sensorgen.design.design import make
 from sensorgen.prediction.bodies import default_body, estimated
-from sensorgen.workflows import build
+from sensorgen.workflows import build, compensation
 from sensorgen.workflows.trial import Numbers, Trial
 
 SMALL = ["tri", "--size", "12x8"]
@@ -131,6 +132,23 @@ def test_a_build_is_compensated(run, contents, tmp_path):
     found = json.loads(run("build", "reference", "--size", "12x8", "--no-cad", "--compensate", "bake", "--json").out)
     assert found["compensated"][0]["what"] == "shrinkage"
     assert (found["compensated"][0]["before"], found["compensated"][0]["after"]) == (0.0, 0.2)
+
+
+def test_a_compensation_is_by_prints_of_the_slicer_that_decides(monkeypatch):
+    asked, calls = make({"shape": "reference"}), []
+
+    def by(design, walls, *, sliced, **_):
+        calls.append((design, walls, sliced))
+        return design, []
+
+    monkeypatch.setattr(compensation, "compensated", by)
+    monkeypatch.setenv("SENSORGEN_SLICER", "cura")
+    designs.compensated(asked, "print")
+    monkeypatch.setenv("SENSORGEN_SLICER", "none")
+    designs.compensated(asked, "print")
+    (_, walls, by_slicer), by_estimate = calls
+    assert (walls, by_slicer.func) == ("cura-gaps", designs.sliced)
+    assert by_estimate == (asked, "arachne", None)
 
 
 @pytest.mark.usefixtures("at_rest")

@@ -184,7 +184,7 @@ def _sparse(region: Region, lines: LineLayout, line_mm: float, way: str, shift: 
 def _printed(
     layer: LayerRegions, scene: Scene, printer: Printer, wide: Rule, laid: Mapping[str, LineLayout], *, overlap: bool
 ) -> dict[str, Region]:
-    """Regions that walls make of a layer; a place that two bodies swell into is the first one's, unless they overlap."""
+    """Regions that walls make of a layer; one that two bodies swell into is the first one's, unless they overlap."""
     length, width, _ = scene.size_mm
     regions: dict[str, Region] = {}
     # Electrodes first and support last, as their tools are.
