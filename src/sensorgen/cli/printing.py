@@ -96,7 +96,7 @@ def build_command(
     no_cad
         Skip the STEP file (saves about 3 s).
     force
-        Write the files even if checks report errors.
+        Write the files even if checks report errors, and end with exit code 0.
     verify
         Write nothing: compare the folder with its record and the log.
     details
@@ -173,7 +173,7 @@ def slice_command(
     out
         Folder for the designs' folders.
     force
-        Slice even if checks of the design report errors.
+        Slice even if checks of the design report errors, and end with exit code 0 if the file has none.
     """
     from sensorgen.export.slicing import STEPS
     from sensorgen.workflows.slice import slice_design
@@ -242,7 +242,7 @@ def _plan(
     no_gcode
         Leave out slicing, which takes most of the time.
     force
-        Write the files even if checks report errors.
+        Write the files even if checks report errors, and end with exit code 0 if the G-code has none.
     jobs : N
         Processes at once; one if not given.
     """

@@ -21,6 +21,7 @@ from sensorgen.export.slicing import Step
 from sensorgen.prediction.new_slice import SliceReport, slice_now
 from sensorgen.prediction.print_files import NONE, PrintFile
 from sensorgen.prediction.slices import PrintReview, combined, of_own_machine, reviewed
+from sensorgen.workflows.build import json_bytes
 from sensorgen.workflows.trial import Adjustment, compensation
 
 
@@ -91,14 +92,14 @@ def slice_design(
     strict : bool
         Take warnings for errors.
     compensated : sequence of Adjustment
-        How the design differs from the one that was asked for, for the record.
+        How the design differs from the one that was asked for, for the record; it is written too, as ``design.json``.
     step : callable
         Called with the next step, for a progress display.
 
     Raises
     ------
     Unprintable
-        The checks of the design found errors; nothing was written.
+        The checks of the design, or with ``strict`` of its print, found errors; nothing was written.
     SlicerFailed, BadInput, UnknownName
         See :func:`sensorgen.export.slicing.sliced`.
     Unwritable
@@ -112,6 +113,8 @@ def slice_design(
     sliced = slice_now(design, slicer, program=program, time_limit_s=time_limit_s, strict=strict, step=step)
     report = sliced.report
     whole = combined(design, drawn, report.slicer.words, report.of_print(), PrintFile(sliced.record(), sliced.content))
+    if strict and whole.errors(strict) and not (force or report.refused):
+        raise Unprintable(whole.findings, whole.errors(strict), whole.source)
     page = ""
     if sliced.printed.lines and len(sliced.printed.lines.number):
         travel = {"as sliced": sliced.lifted.before, "as written": sliced.lifted.after}
@@ -125,6 +128,8 @@ def slice_design(
         **vars(report), gcode=names[0], verdict=whole.verdict, all_findings=tuple(whole.findings),
         compensated=tuple(compensated),
     )  # fmt: skip
+    if compensated:
+        store.replace(out / design.name / "design.json", json_bytes(design.model_dump(mode="json")))
     return _written(result, out / design.name, sliced.content, page, others)
 
 
