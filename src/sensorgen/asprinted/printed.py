@@ -16,7 +16,6 @@ import numpy as np
 import shapely
 
 from sensorgen.checks import estimate, volumes
-from sensorgen.checks.review import GCODE
 from sensorgen.checks.volumes import LayerVolume
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
@@ -329,7 +328,7 @@ class Printed:
             )
             for short in next(iter(self._connected.values())).shorts
         ]  # fmt: skip
-        other = [Finding(GCODE, "warning", "file", doubt, "give the design that was sliced") for doubt in self.doubts]
+        other = [Finding("13-gcode", "warning", "file", doubt, "give its own design") for doubt in self.doubts]
         return self.design.waived([*volumes.findings(self.rows, self.design.printed), *shorts, *other])
 
 

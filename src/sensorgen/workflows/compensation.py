@@ -100,10 +100,10 @@ def compensated(
         raise _refused(f": a film has {layers}", design, made, printed, asked)
     if search.best is None:
         raise _refused(f" of {design.name} by {walls} walls{search.fault()}", design, made, printed, asked)
-    if not (changes or after.values):
-        return now, []
     why = "gap, capacitance and stiffness" if stiffness else "gap and capacitance"
     changes += [Adjustment(key[-1], _own(now, key), float(value), why) for key, value in after.values.items()]
+    if not changes:
+        return now, []
     before = _before(design, sliced, walls, stiffness=stiffness)
     return _named(made, design), [*changes, *_comes_out(before, printed, asked)]
 
