@@ -209,7 +209,8 @@ def test_a_file_of_another_design_is_not_taken_without_a_word(run, tmp_path):
     assert (lower.code, json.loads(lower.out)["status"]) == (2, "not predicted")
     assert "prints up to Z 1 mm, above the top of reference-length12-width8-dielectric0.3 at 0.9 mm" in lower.line
     same = (*plate, "--dielectric", "0.2", "--electrode", "0.4")
-    (doubt,) = json.loads(run("predict", *same, *how).out)["doubts"]
+    doubt, of_bodies = json.loads(run("predict", *same, *how).out)["doubts"]
+    assert of_bodies.startswith("tool 4 prints 96 mm2")
     assert doubt.startswith("the record beside other.gcode names another design, 'other'")
     assert doubt in run("export", *same, "--gcode", str(file), "-o", "body.stl").out
     assert doubt in {f.message for f in registered(make({"shape": "reference", "parameters": SIZE | {

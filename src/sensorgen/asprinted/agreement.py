@@ -30,6 +30,7 @@ SOME_THIN = 0.6  # share of a tool's length that may be thin
 MOST_LAYERS = 2.5  # that a line may lie above what stands there
 PURGED_MM3 = PRIME_MM3 / 3  # that fill the nozzle after a change of tools; towers take PRIME_MM3
 _SUPPORT = "support"
+_OF_ANOTHER = ("first-layer", "layers", "material", "volume")  # rules that the print of another design breaks
 
 
 def check(
@@ -108,7 +109,7 @@ def _of_piece(
 
 
 def misfits(design: Design, paths: Paths, centre_mm: Point) -> list[GcodeFinding]:
-    """Errors of a piece whose layers are not those of a design; arguments as of :func:`check`.
+    """Errors of a piece whose layers, materials or volumes are not those of a design; arguments as of :func:`check`.
 
     Raises
     ------
@@ -122,7 +123,10 @@ def misfits(design: Design, paths: Paths, centre_mm: Point) -> list[GcodeFinding
             f"this G-code prints up to Z {printed_mm:g} mm, above the top of {design.name} at {top_mm:g} mm; expected "
             "the design that it was sliced from: give that one, or slice this one"
         )
-    return [f for f in _heights(design, paths, piece) if f.severity == "error"] if piece.any() else []
+    if not piece.any():
+        return []
+    findings = [*_heights(design, paths, piece), *ledger.check(design, beads(design, paths, centre_mm))]
+    return [f for f in findings if f.severity == "error" and f.rule in _OF_ANOTHER]
 
 
 def _ends(design: Design, paths: Paths, centre_mm: Point) -> list[Real]:

@@ -206,7 +206,8 @@ def registered(design: Design, path: Path) -> "Printed":
         body = printed.body(design, placement.paths, slicer=path.name, centre_mm=placement.centre_mm)
     except BadInput as error:
         raise error.within(str(path)) from None
-    return replace(body, doubts=(*filter(None, [_of_another(design, path)]), *(f.message for f in wrong)))
+    more = f" ({len(wrong) - 1} more by gcode check --design)" if len(wrong) > 1 else ""
+    return replace(body, doubts=(*filter(None, [_of_another(design, path)]), *(f.message + more for f in wrong[:1])))
 
 
 def _of_another(design: Design, path: Path) -> str:
