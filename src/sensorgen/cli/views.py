@@ -169,6 +169,6 @@ def export_command(
 
     body_printed, _ = body.printed(design)
     assert body_printed is not None  # noqa: S101  (there is no --drawn)
-    render.say(body_printed.provenance)
+    render.say("\n".join((body_printed.provenance, *(f"doubtful: {doubt}" for doubt in body_printed.doubts))))
     for path in export(body_printed, output or Path(f"{design.name}.3mf"), voxel_mm):
         render.say(path)
