@@ -24,7 +24,7 @@ from sensorgen.prediction import capacitance as expectations
 from sensorgen.prediction import compression_law as celllaw
 from sensorgen.prediction import mesh_ladder as pressing
 from sensorgen.scene.scene import Body, Scene, box
-from sensorgen.verification.chart import cells
+from sensorgen.verification.chart import scenes as standard
 
 Real = NDArray[np.float64]
 HERE = Path(__file__).parent
@@ -97,11 +97,10 @@ def anew() -> Iterator[str]:
 
 def bounded(model: str, scene: str) -> Iterator[tuple[float, float]]:
     """Widths of a model's bounds, each with its time."""
-    cells.points(scene, 0.0)  # what is done once, as imports
-    for point in cells.points(scene, BUDGET_S):
+    standard.chart([scene], 0.0)  # what is done once, as imports
+    for point in standard.chart([scene], BUDGET_S).points:
         if point.model == model:
-            width = 2 * (point.upper_f_per_m2 - point.lower_f_per_m2)
-            yield width / (point.upper_f_per_m2 + point.lower_f_per_m2), point.seconds
+            yield 2 * point.stated, point.warm_cpu_s
 
 
 def pressed(model: str) -> Iterator[tuple[float, float]]:

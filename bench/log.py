@@ -90,7 +90,12 @@ def of_a_table(folder):
         seconds, _, peak = spent(
             "report", "--iteration", 23, "--log", log, "--format", form, "-o", folder / "table.out"
         )
-        yield f"`report` of it as {form}", f"{seconds:.1f} s, {peak:.2f} GB", "5 s" * (form == "html")
+        size = (folder / "table.out").stat().st_size / 1e6
+        yield (
+            f"`report` of it as {form}",
+            f"{seconds:.1f} s, {peak:.2f} GB, {size:.1f} MB",
+            "5 s, 3 MB" * (form == "html"),
+        )
 
 
 def of_records(folder):

@@ -41,7 +41,7 @@ def main() -> None:
         middle = time.process_time()
         page = "".join(pieces(made, "html"))
         end = time.process_time()
-        rows = next(t for t in made.tables if t.key == "recordings").rows
+        rows = next(t for t in made.tables if t.key == "recordings").cells
         print(f"samples: {rows[0][4]}, presses: {rows[0][8]}")
         print(f"computed in {middle - start:.1f} s, written in {end - middle:.1f} s of processor time")
         print(f"{time.perf_counter() - wall:.1f} s by the clock")

@@ -151,9 +151,3 @@ def test_what_is_held_back_is_for_another_to_keep():
     with cached.held_back() as new:
         assert cached.answer(QUESTION, never) == 3
     assert new == []
-
-
-def test_where_nothing_is_kept_each_answer_is_worked_out_anew():
-    with cached.nothing_kept():
-        assert [cached.answer(QUESTION, lambda n=n: n) for n in (3, 4)] == [3, 4]
-    assert entries() == []

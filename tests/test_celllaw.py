@@ -107,7 +107,7 @@ def test_a_curve_ends_where_the_capacitance_is_no_longer_known(monkeypatch):
 
 
 def test_tops_are_those_of_a_cell_that_they_press_also_where_gaps_close_under_one_alone(monkeypatch):
-    """Under an even pressure the thin electrode of a long period reaches the tips at 50 kPa, under a plate never."""
+    """Under an even pressure the thin electrode reaches the tips at 50 kPa; under a plate it does not."""
     pytest.importorskip("netgen", reason="solves a cell: pip install sensorgen[fem]")
     from sensorgen.prediction import compression_law as celllaw
 

@@ -22,12 +22,11 @@ from sensorgen import models
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError, UnknownName
 from sensorgen.models import fem3d
-from sensorgen.verification import chart
-from sensorgen.verification.chart import cells, elastic, lines, networks, presses
-from sensorgen.verification.chart import measured as measured_in
+from sensorgen.verification import apart, peers
+from sensorgen.verification.chart import cells, elastic, lines, networks, presses, results, scenes, whole
 from sensorgen.verification.chart import plot as pictures
 from sensorgen.verification.chart.cells import STANDARD
-from sensorgen.verification.chart.measured import ChartPoint, with_front
+from sensorgen.verification.chart.question import of_scene, own
 from sensorgen.verification.chart_command import command
 
 REFERENCE = Path(__file__).parent / "reference"
@@ -37,26 +36,20 @@ REFERENCE = Path(__file__).parent / "reference"
 def _timed_once():
     """Time each point once; repeated timing has a test of its own."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(measured_in, "_REPEATS", 1)
+        patch.setattr(apart, "_REPEATS", 1)
         yield
 
 
-def point(seconds, error, model="m", bounded=True, scene="s"):
-    return ChartPoint(scene, model, error, seconds, "", bounded, None, 1.0, 1.1)
+def points(name, budget_s=0.0, runner=apart.here):
+    """Answers on a scene, each model's from coarse to fine."""
+    return scenes.chart([name], budget_s, runner=runner).points
 
 
 @given(st.lists(st.tuples(st.integers(1, 6), st.integers(1, 6)), min_size=1, max_size=12))
 def test_the_front_is_what_nothing_beats(pairs):
-    found = with_front([point(float(s), float(e)) for s, e in pairs])
-    assert sorted((p.seconds, p.error) for p in found) == sorted(pairs)
-    for p in found:
-        better = [q for q in pairs if q[0] <= p.seconds and q[1] <= p.error and q != (p.seconds, p.error)]
-        if p.front:
-            assert not better
-        else:
-            assert better or pairs.count((p.seconds, p.error)) > 1
-    front = {(p.seconds, p.error) for p in found if p.front}
-    assert front == {q for q in pairs if not any(r[0] <= q[0] and r[1] <= q[1] and r != q for r in pairs)}
+    front = results.unbeaten(pairs)
+    assert front == sorted(set(front))
+    assert set(front) == {q for q in pairs if not any(r[0] <= q[0] and r[1] <= q[1] and r != q for r in pairs)}
 
 
 def test_every_cell_of_the_reference_is_there():
@@ -116,24 +109,31 @@ def measured():
     with pytest.MonkeyPatch.context() as patch:  # by accuracy, not by time: a busy machine measures the same points
         patch.setattr(cells, "_LEAST_WIDTH", 1e-6)
         patch.setattr(cells, "_NO_PEERS", tuple(cells.STANDARD))  # test_design_chart.py has them
-        found = chart.points(["tri, 0.2 mm", "plate, 0.6 mm"], 1e9, said.append)
-    assert said == ["tri, 0.2 mm", "plate, 0.6 mm"]
+        found = scenes.chart(["tri, 0.2 mm", "plate, 0.6 mm"], 1e9, said.append)
+    named = ["tri, 0.2 mm", "plate, 0.6 mm"]
+    assert [words for words in said if words in named] == named
+    assert {f"{p.question}: {p.model}" for p in found.points} == set(said) - set(named)
+    assert not found.problems()
     return found
 
 
 def test_what_is_known_of_errors(measured):
     """Thesis 3.35 is off by -24 %, as printed negative; bounds hold the truth; the plate is exact."""
-    for p in measured:
-        known = STANDARD[p.scene]()
-        if p.bounded:
+    for p in measured.points:
+        known = STANDARD[p.question]()
+        if p.certified:
+            lower, upper = (float(p.value) * end for end in (1 - p.stated, 1 + p.stated))
             slack = 1e-9 * known.capacitance_f_per_m2
-            assert p.lower_f_per_m2 - slack <= known.capacitance_f_per_m2 <= p.upper_f_per_m2 + slack
-        if p.scene.startswith("plate"):
+            assert lower - slack <= known.capacitance_f_per_m2 <= upper + slack
+            assert p.error == pytest.approx(
+                max(abs(b / known.capacitance_f_per_m2 - 1) for b in (lower, upper)), abs=2e-9
+            )
+        if p.question.startswith("plate"):
             assert p.error < 1e-8  # finite elements widen their bounds by what rounding may do
-    off = {p.model: p.error for p in measured if p.scene == "tri, 0.2 mm" and not p.bounded}
+    off = {p.model: p.error for p in measured.points if p.question == "tri, 0.2 mm" and not p.certified}
     assert off["thesis_cells: 3.35"] == pytest.approx(0.2417, abs=2e-4)
     assert off["thesis_cells: 3.34-printed"] > 1
-    assert min(p.error for p in measured if p.model == "fem2d" and p.scene.startswith("tri")) < 1e-5
+    assert min(p.error for p in measured.points if p.model == "fem2d" and p.question.startswith("tri")) < 1e-5
 
 
 def widths(work, width=1e-3):
@@ -204,18 +204,19 @@ def test_the_line_under_a_round_tip_is_known():
 def of_lines():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(lines, "_PIECES", (1, 4, 16))
-        return chart.points(list(lines.STANDARD), 1e9, lambda _: None)
+        return scenes.chart(list(lines.STANDARD), 1e9).points
 
 
 def rungs(found, scene, model):
-    """Errors from coarse to fine: points come by time, and the time of a busy computer is no order."""
-    points = [p for p in found if (p.scene, p.model) == (scene, model)]
-    return [p.error for p in sorted(points, key=lambda p: int(p.result.split()[0]))]
+    """Errors from coarse to fine."""
+    mine = [p for p in found if (p.question, p.model) == (scene, model)]
+    assert mine == sorted(mine, key=lambda p: int(p.level.split()[0]))
+    return [p.error for p in mine]
 
 
 def test_what_is_known_of_lines(of_lines):
     """Grids of the sheet are of second order, and so are the cells of another program's circuit."""
-    low, wide = ({p.model: p.error for p in of_lines if p.scene == name} for name in FLAT)
+    low, wide = ({p.model: p.error for p in of_lines if p.question == name} for name in FLAT)
     assert max(found[model] for found in (low, wide) for model in ("line", "line_tip")) < 1e-15
     assert max(found["stack: one film"] for found in (low, wide)) < 1e-12
     grid = rungs(of_lines, "line, seven tones", "sheet")
@@ -223,7 +224,8 @@ def test_what_is_known_of_lines(of_lines):
     if shutil.which("ngspice"):
         circuit = rungs(of_lines, "line, seven tones", "ngspice")
         assert [a / b for a, b in pairwise(circuit)] == pytest.approx([100, 100], rel=0.01)
-    assert all(p.seconds > 0 and not p.bounded and "Re Z by" in p.result for p in of_lines)
+    assert all(p.warm_cpu_s > 0 and p.cold_cpu_s is None and not p.certified for p in of_lines)
+    assert {len(p.value.split()) for p in of_lines if p.question == ROUND} == {len(lines.STANDARD[ROUND].known)}
 
 
 def test_pieces_of_a_tip_are_of_second_order(of_lines):
@@ -231,14 +233,14 @@ def test_pieces_of_a_tip_are_of_second_order(of_lines):
     pieces = rungs(of_lines, ROUND, "line_tip")
     assert len(pieces) == 3
     assert pieces[1] / pieces[2] == pytest.approx(16, rel=0.25)
-    flat = next(p.error for p in of_lines if p.scene == ROUND and p.model == "line")
+    flat = next(p.error for p in of_lines if p.question == ROUND and p.model == "line")
     assert pieces[0] == pytest.approx(flat, rel=1e-6)
     assert 5e-5 < flat < 2e-4
 
 
 def by_model(name, budget_s=0.0):
     """The coarsest answer of each model on a scene, and the finest."""
-    found = chart.kind_of(name).points(name, budget_s)
+    found = points(name, budget_s)
     return {p.model: p for p in reversed(found)}, {p.model: p for p in found}
 
 
@@ -290,17 +292,22 @@ def test_what_faults_is_not_shown():
     def faulty():
         return SimpleNamespace(faults=("a fault",), displacement_m=np.zeros(2))
 
-    levels = [("", lambda: elastic._displacement_m(faulty()))]
-    assert not list(measured_in.climbed("s", [("press2d", levels)], measured_in.relative(1.0, 0.0), 1.0))
+    levels = [("coarse", lambda: elastic._displacement_m(faulty())), ("fine", lambda: 1.0)]
+    question = of_scene(
+        "s", "", own([("press2d", levels[:1]), ("press3d", levels)], {"press2d": "it faults"}), 1.0, 1e-9
+    )
+    found = results.measured([question], 1.0, lambda _: None, apart.here)
+    assert [p.words() for p in found.points] == ["press3d fine"]
+    assert [(s.model, s.why) for s in found.silent] == [("press2d", "it faults")]
 
 
 def test_cooks_membrane_converges():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(elastic, "_CELLS", (4, 8, 16))
-        found = [p.error for p in elastic.MEMBRANE.points("Cook's membrane", 1e9)]
+        found = [p.error for p in points("Cook's membrane", 1e9)]
     assert found[0] == pytest.approx(0.041, abs=1e-3)
     assert all(3 * b < a < 5 * b for a, b in pairwise(found))  # its corners are singular
-    assert len(elastic.MEMBRANE.points("Cook's membrane", 0.0)) == 1
+    assert len(points("Cook's membrane")) == 1
 
 
 def test_a_cylinder_touches_as_hertz_says():
@@ -338,9 +345,9 @@ def test_networks():
     assert pytest.approx(squares, rel=1e-12) == networks._SQUARES
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(networks, "_GRIDS", (20, 40, 80))
-        grids = [p.error for p in networks.points("sheet, contacts on one edge", 1e9)]
+        grids = [p.error for p in points("sheet, contacts on one edge", 1e9)]
     assert all(a > 2.5 * b for a, b in pairwise(grids))
-    steps = networks.points("electrode, steps across the current", 1e9)
+    steps = points("electrode, steps across the current", 1e9)
     assert all(p.error < most for p, most in zip(steps, (1e-6, 1e-8, 1e-12, 1e-12), strict=True))
     across, _ = by_model("printed lines across the current")
     assert across["traxels"].error < 1e-9
@@ -354,7 +361,7 @@ def test_a_printed_electrode_is_that_of_the_reference():
     assert standard.known.tolist() == [known["90"][known["contact_ohm_m2"].index(1e-4)]]
     found, _ = by_model("printed electrode, 1e-4 ohm m²")
     assert found["traxels"].error == 0.05  # no less than the reference's own
-    assert float(found["traxels"].result.split()[2]) < 0.02
+    assert float(found["traxels"].value) == pytest.approx(standard.known[0], rel=0.02)
 
 
 def test_every_model_is_on_the_chart():
@@ -364,41 +371,47 @@ def test_every_model_is_on_the_chart():
         "cylinder on a flat", "sphere on a flat", "line, seven tones", ROUND, "electrode, steps across the current",
         "printed lines across the current",
     ]  # fmt: skip
-    found = chart.points(names, 0.0, lambda _: None)
-    spoke = {p.model.partition(":")[0] for p in found}
+    found = scenes.chart(names, 0.0)
+    spoke = {p.model.partition(":")[0] for p in found.points}
     missing = set() if presses.has_mesher() else {"press2d", "press_round"}
     missing |= {"closed", "coupons", "curved", "overlap", "porous", "sandwich"}  # have benches and tests of their own
     assert set(models.names()) - spoke == missing
-    said = {(s.scene, s.model): s.why for s in chart.silent(names, found)}
-    both = {(p.scene, p.model.partition(":")[0]) for p in found} | set(said)
-    assert {(name, model) for name in names for model in models.names()} <= both
-    assert not {(p.scene, p.model.partition(":")[0]) for p in found} & set(said)
+    silent = [s for s in (*found.silent, *found.unasked) if not s.why.endswith("more than --budget 0")]
+    said = {(s.question, s.model): s.why for s in silent}
+    answers = {(p.question, p.model.partition(":")[0]) for p in found.points}
+    assert {(name, model) for name in names for model in models.names()} <= answers | set(said)
+    assert not answers & set(said)
+    assert len(silent) == len(said)
     assert all(said.values())
     assert said["tri, 0.1 mm", "fem3d"] == fem3d.why_not_applicable(STANDARD["tri, 0.1 mm"]().scene)
     assert said["tri, 0.1 mm", "line"].endswith("Not the capacitance of a cell at rest.")
     assert "along its depth" in said["block, free all round", "press2d"]
 
 
-@pytest.mark.parametrize("name", chart.SCENES)
+@pytest.mark.parametrize("name", scenes.SCENES)
 def test_every_scene_has_a_question_and_reasons(name):
-    kind = chart.kind_of(name)
-    reasons = kind.why_not_applicable(name)
-    assert set(reasons) <= set(models.names())
-    assert kind.asked
-    assert len(chart.SCENES) == len(set(chart.SCENES))
+    question = scenes.SCENES[name]()
+    reasons = {series.model.partition(":")[0] for series in question.series if series.why_not}
+    assert reasons <= {*models.names(), *peers.ALL}
+    assert question.asked
+    assert question.key == name
+    assert question.references
+    kinds = cells.STANDARD, presses.STANDARD, elastic.BLOCKS, elastic.MEMBRANE, elastic.ROUND, lines.STANDARD
+    kinds += lines.INVERSION, networks.STANDARD, whole.STANDARD
+    assert len(scenes.SCENES) == sum(map(len, kinds))
 
 
 def test_what_is_known_of_presses(monkeypatch):
     """Cheap laws are off by what docs/compression.md and docs/cells.md say; a budget ends the meshes."""
     monkeypatch.setattr(presses, "_levels", lambda *_: [])
-    asked = (presses.points(f"tri pressed, 0.1 mm: {what}", 1.0) for what in ("top down", "rise of C"))
-    down, rise = ({p.model: p for p in points} for points in asked)
+    down, rise = (by_model(f"tri pressed, 0.1 mm: {what}", 1.0)[0] for what in ("top down", "rise of C"))
     assert down["compression: unconfined"].error == pytest.approx(1 - 0.6e-3 * 1e4 / 6e6 / 6.1323e-6, abs=1e-4)
     assert down["compression: bonded"].error > 0.99
     assert down["springs"].error > 1
     assert rise["thesis_cells: 3.1.2, field"].error == pytest.approx(0.818, abs=0.002)
     assert rise["thesis_cells: 3.1.2, formula 3.35"].error == pytest.approx(0.780, abs=0.002)
-    assert "off by -" in rise["thesis_cells: 3.1.2, field"].result
+    field = np.array(rise["thesis_cells: 3.1.2, field"].value.split(), float)
+    assert (field < presses.CELLS["0.1 mm"].rise_pf_per_m).all()
 
 
 @pytest.mark.skipif(not presses.has_mesher(), reason="needs NGSolve")
@@ -410,11 +423,14 @@ def test_meshes_of_presses_come_nearer_until_it_costs_too_much(monkeypatch):
         return SimpleNamespace(converged_pa=stress[-1], displacement_m=down_um * 1.01e-6)
 
     monkeypatch.setattr(presses.press2d, "press", work)
-    monkeypatch.setattr(measured_in, "timed", lambda work: (work(), 1.0))
-    found = [p for p in presses.points("tri pressed, 0.1 mm: top down", 5.0) if p.model == "press2d"]
+
+    def a_second(work):
+        return apart.TimedAnswer(work(), None, apart.Cost(1.0, 1.0))
+
+    found = [p for p in points("tri pressed, 0.1 mm: top down", 5.0, a_second) if p.model == "press2d"]
     assert [p.error for p in found] == [pytest.approx(0.01)]
     asked.clear()
-    presses.points("tri pressed, 0.1 mm: top down", 50.0)
+    points("tri pressed, 0.1 mm: top down", 50.0, a_second)
     assert (len(asked), asked) == (3, sorted(asked, reverse=True))
 
 
@@ -423,14 +439,15 @@ def test_without_the_mesher_cheap_laws_are_left(monkeypatch):
     plates, thesis = {"compression: unconfined", "compression: bonded"}, "thesis_cells: 3.1.2"
     expected = {"top down": {"springs"}, "rise of C": {f"{thesis}, formula 3.35", f"{thesis}, field"}}
     for name, others in expected.items():
-        assert {p.model for p in presses.points(f"tri pressed, 0.2 mm: {name}", 1.0)} == plates | others
+        assert {p.model for p in points(f"tri pressed, 0.2 mm: {name}", 1.0)} == plates | others
 
 
 def test_the_page_in_a_browser(measured, tmp_path, browser):
     (tmp_path / "page.html").write_text(pictures.html(measured), "utf-8")
-    browser.open(tmp_path / "page.html", ready=f"document.querySelectorAll('path.point').length === {len(measured)}")
+    shown = f"document.querySelectorAll('path.point').length === {len(measured.points)}"
+    browser.open(tmp_path / "page.html", ready=shown)
     names = "[...document.querySelectorAll('.plot')].flatMap(p => p.data.map(t => t.name)).filter(n => n)"
-    assert set(browser.run(names)) == {p.model for p in measured} | {"Pareto front"}
+    assert set(browser.run(names)) == {p.model for p in measured.points} | {"Pareto front", "known to"}
     assert (browser.complaints(), browser.asked()) == ([], [])
 
 
@@ -442,10 +459,11 @@ def test_the_command(tmp_path):
     assert sorted(p.name for p in out.iterdir()) == ["chart.csv", "chart.html", "chart.png"]
     rows = list(csv.DictReader((out / "chart.csv").read_text().splitlines()))
     exact = next(row for row in rows if row["model"] == "columns")
-    assert float(exact["lower_f_per_m2"]) == pytest.approx(8.8541878128e-12 * 4.68 / 0.6e-3, rel=1e-12, abs=0)
-    assert exact["front"] == "True"
+    assert float(exact["value"]) == pytest.approx(8.8541878128e-12 * 4.68 / 0.6e-3, rel=1e-12, abs=0)
+    assert float(exact["stated"]) < 1e-12
+    assert exact["front"] == "true"
     told = [row for row in rows if row["why"]]
-    assert all(math.isfinite(float(row["seconds"])) for row in rows if row not in told)
+    assert all(math.isfinite(float(row["warm_cpu_s"])) for row in rows if row not in told)
     assert {row["model"] for row in told} >= {"line", "traxels", "press3d"}
     assert len({row["model"].partition(":")[0] for row in rows}) == len(models.names())
 

@@ -3,7 +3,8 @@
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
+from math import cos, pi, sin
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -12,11 +13,14 @@ from hypothesis import strategies as st
 from sensorgen.core import lazy as registry
 from sensorgen.core.findings import Finding
 from sensorgen.design import shapes
+from sensorgen.design.design import make
 from sensorgen.scene import drawing
 from sensorgen.scene.drawing import svg
 from sensorgen.scene.drawing.panels import beside
 from sensorgen.scene.drawing.paper import ViewFrame, width
 from sensorgen.scene.drawing.view import Measure, nearest, period, views
+from sensorgen.scene.layers import faces_mm
+from sensorgen.scene.polyhedra import Polyhedron
 from sensorgen.scene.scene import Body, Fill, Point, Prism, Scene, area_mm2, box
 from sensorgen.scene.sections import Section, SectionColumn, columns
 
@@ -339,11 +343,64 @@ def test_dimensions_are_the_parameters() -> None:
         assert value in said
 
 
+def banded(x: float, y: float, *rings: Point) -> Polyhedron:
+    """A body of revolution as CAD programs export it: rings of 32 corners by radius and height, from below [mm]."""
+    turns = [2 * pi * k / 32 for k in range(32)]
+    corners = [(x + r * cos(t), y + r * sin(t), z) for r, z in rings for t in turns]
+    ends = ((x, y, rings[0][1]), (x, y, rings[-1][1]))
+    low, high = len(corners), len(corners) + 1
+    around = [(k, (k + 1) % 32) for k in range(32)]
+    flank = [
+        face
+        for up in range(0, len(corners) - 32, 32)
+        for a, b in around
+        for face in ((up + a, up + b, up + 32 + b), (up + a, up + 32 + b, up + 32 + a))
+    ]
+    lids = [face for a, b in around for face in ((low, b, a), (high, low - 32 + a, low - 32 + b))]
+    return Polyhedron((*corners, *ends), (*flank, *lids))
+
+
+def test_bands_of_a_curved_face_are_no_faces_and_have_no_dimensions() -> None:
+    """Flanks of cones bulge by less than the chord of an import; each band was a face and dimensioned."""
+    rings = ((0.33, 0.5), (0.392, 0.5 + 0.4 / 3), (0.447, 0.5 + 0.8 / 3), (0.5, 0.9))
+    cones = [banded(0.625 + 1.25 * i, 0.625 + 1.25 * j, *rings) for i in range(4) for j in range(4)]
+    top = Body("top", "etpu", (*cones, box(0, 5, 0, 5, 0.9, 1.2)), "top")
+    bottom = Body("bottom", "etpu", (box(0, 5, 0, 5, 0, 0.3),), "bottom")
+    scene = Scene((bottom, Body("film", "x60", (box(0, 5, 0, 5, 0.3, 0.5),)), top), (5.0, 5.0, 1.2))
+    assert faces_mm(top) == {0.5, 0.9, 1.2}
+    said = words(drawn(scene))
+    assert {"0.17", "0.66", "0.25", "1.25"} <= set(said)
+    assert not [word for word in said if re.fullmatch(r"0\.0[56]\d*", word)]
+    step = banded(0.0, 0.0, (0.5, 0.0), (0.5, 0.35), (0.3, 0.35), (0.3, 0.6))
+    tip = Polyhedron(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0.2, 0.2, 1.05)), ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)))
+    assert (step.levels_mm(), tip.levels_mm()) == ({0.0, 0.35, 0.6}, {0.0, 1.05})
+
+
 def test_the_period_survives_a_pattern_that_begins_within_one() -> None:
     strips = {view.section.across: view for view in views(scene_of("rect", width_mm=9.5).turned_over())}
     assert strips["y"].repeat_mm() == pytest.approx(2.0)
     assert period(Section("x", 1.0, 0.5, ())) == ()
     assert views(scene_of("reference"))[0].period_mm == ()
+
+
+def test_details_of_an_array_show_a_crossing() -> None:
+    """They showed the leads at the sensor's corner alone; letters lay below the outlines of the print."""
+    parameters = {"length_mm": 30, "width_mm": 20, "pitch_x_mm": 9, "pitch_y_mm": 7, "column_mm": 6, "row_mm": 6}
+    array = make({"shape": "array", "parameters": parameters, "cell": {"shape": "tri"}}).printed
+    text = svg(array, "an array", layers_of(array), (), COLOURS, printed=array)
+    page = ET.fromstring(text)
+    stays_on_page(page)
+    windows = re.findall(r"Section .: . = \S+ mm, . from (\S+) to (\S+) mm, \d", text)
+    assert len(windows) == 2
+    for view, (start, end) in zip(views(array), windows, strict=True):
+        tracks: dict[str, list[Point]] = {"top": [], "bottom": []}
+        for body, outline in view.section.regions:
+            if body.terminal:
+                tracks[body.terminal].append((min(u for u, _ in outline), max(u for u, _ in outline)))
+        shared = [(max(a, c), min(b, d)) for (a, b), (c, d) in product(tracks["top"], tracks["bottom"])]
+        assert max(min(high, float(end)) - max(low, float(start)) for low, high in shared) > 1.9  # a cog and more
+        assert max(min(high, 10.0) - low for low, high in shared) < 0  # at the corner
+    assert text[: text.index(">A</text>")].count('class="printed"') >= len(array.bodies) - 1
 
 
 def test_the_gap_is_the_smallest_distance_even_aslant() -> None:

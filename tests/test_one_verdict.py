@@ -53,7 +53,9 @@ def folder(slices, tmp_path, monkeypatch, program):
 
 def _said(out):
     """Verdict, counts and source in a text."""
-    found = re.search(r"(CHANGE|PRINT WITH WARNINGS|PRINT)\s+\S+: (.*?); (sliced by \S+\s\S+|estimated)", _words(out))
+    found = re.search(
+        r"(CHANGE|PRINT WITH WARNINGS|PRINT)\s+\S+: (.*?); (sliced by \S+\s[^\s;]+|estimated)", _words(out)
+    )
     assert found, out
     return found.groups()
 

@@ -40,7 +40,10 @@ def test_pictures_are_drawn_and_the_same_every_time(run):
     sets = {"$a$ $\\frac$": run.pairs, "b": run.pairs}
     assert static.png(bench.compared(sets, run.tones_hz)).startswith(b"\x89PNG")
     plan = RunPlan(1, 20, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0)
-    assert static.png(bench.schedule(plan.steps(), plan.seconds())).startswith(b"\x89PNG")
+    schedule = bench.schedule(plan.steps(), plan.seconds())
+    assert static.png(schedule).startswith(b"\x89PNG")
+    axes = static.drawn(schedule, schedule.choices[""]).axes  # the scale of colours is between the two
+    assert [one.get_ylabel() for one in axes] == ["force [N]", "force [N]", "number of the load"]
 
 
 def test_the_page_has_every_tone_and_asks_no_network(run):

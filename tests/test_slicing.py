@@ -23,7 +23,7 @@ from sensorgen.design.design import make
 from sensorgen.design.printer import folder
 from sensorgen.export import slicing, threemf
 from sensorgen.export.gcode import motion as paths
-from sensorgen.export.gcode.check import check
+from sensorgen.export.gcode.check import check, report
 from sensorgen.export.slicers import run
 from sensorgen.export.slicing import Placed, alone, sliced
 from sensorgen.export.threemf.core import box_mm
@@ -256,6 +256,19 @@ def test_a_design_gets_its_file_and_what_was_found(copies, tmp_path):
     assert made.sha256 == again.sha256 == sha256(content).hexdigest()
     assert content.endswith(b"M0 H1\n")
     assert (made.findings, made.refused, made.tools[0].material) == ((), False, "etpu")
+
+
+def test_placeholders_in_the_head_of_cura_s_file_are_filled_in():
+    """A line of 10 mm there and back, with 3 mm of filament; the head is as the engine writes it alone."""
+    head = ";FLAVOR:RepRap\n;TIME:6666\n;Filament used: 0m\n;Layer height: 0.1\n;MINX:2.14748e+06\n;MAXX:-2.14748e+06\n"
+    text = f"{head}M83\nG90\nT3\nG1 X5 Y2 Z0.1 F600\n;TIME:1\nG1 X15 E2\nG1 X5 E1\n;TIME_ELAPSED:1\n".encode()
+    needs = report(paths.follow(text), SMALL.machine)
+    lines = slicing._with_head(text, needs).decode().splitlines()
+    assert lines[:6] == [
+        ";FLAVOR:RepRap", f";TIME:{needs.time_s:.0f}", ";Filament used: 0.003m", ";Layer height: 0.1", ";MINX:5",
+        ";MAXX:15",
+    ]  # fmt: skip
+    assert lines[6:] == text.decode().splitlines()[6:]
 
 
 def test_the_usual_name_is_that_of_the_last_file_which_passed(copies, tmp_path):

@@ -1,6 +1,7 @@
 """One design tried: the verdict is the build's, the numbers are the prediction's, doubts are apart."""
 
 import pickle
+import re
 from dataclasses import replace
 
 import pytest
@@ -79,6 +80,7 @@ def test_without_electrical_numbers_no_design_is_plainly_printed(tmp_path):
     assert "not predicted: film has no default relative_permittivity" in said
     alone = " ".join(text(decision(design, reviewed(design), 0.0, predict=False).document()))
     assert "not predicted: checks alone" in alone
+    assert all(re.match(r"PRINT WITH WARNINGS .*estimated \(.*\); not predicted ", words) for words in (said, alone))
 
 
 def test_the_first_screen_says_what_is_doubtful():

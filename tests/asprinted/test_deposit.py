@@ -5,6 +5,7 @@ import pytest
 
 from sensorgen.asprinted import ledger
 from sensorgen.asprinted.beads import Beads
+from sensorgen.design import design
 
 SHAPE = (150, 120)
 
@@ -12,7 +13,7 @@ SHAPE = (150, 120)
 def lines(start_mm, end_mm, width_mm, height_mm=0.1):
     way, whole = np.hypot(*(end_mm - start_mm).T), np.zeros(len(start_mm), int)
     height = np.full(len(way), height_mm)
-    return Beads(start_mm, end_mm, width_mm, height, way * width_mm * height, whole, whole, whole, whole)
+    return Beads(start_mm, end_mm, width_mm, height, way * width_mm * height, *(whole.copy() for _ in range(4)))
 
 
 @pytest.mark.parametrize("lot", [7, 1000, 10**6])
@@ -38,3 +39,17 @@ def test_a_line_fills_its_rectangle_and_what_lies_outside_the_raster_is_left_out
     assert inside == pytest.approx(1.0, rel=1e-3)
     assert filled[ledger._MARGIN + 21 : -2].sum() == pytest.approx(inside.sum(), rel=1e-3)
     assert filled[: ledger._MARGIN + 19].sum() == 0
+
+
+@pytest.mark.parametrize(("share", "refused"), [(1.0, False), (1.5, True)])
+def test_strips_that_swell_into_another_material_may_take_all_of_a_line(share, refused):
+    """Strips of 0.125 mm, which PrusaSlicer prints 0.34 mm wide into the film beside them: 16.8 mm3 of 100 x 10 mm."""
+    cells = {"hang_height_mm": 0.4, "dielectric_mm": 0.2}
+    sensor = design.make({"shape": "tri", "parameters": cells})
+    x, names = np.arange(1.5, 100.0, 2.0), [body.name for body in sensor.printed.bodies]
+    strips = lines(*(np.stack([x, np.full_like(x, y)], axis=1) for y in (0.06, 9.94)), np.full(len(x), 0.34 * share))
+    strips.layer[:], strips.body[:] = 5, names.index("hanging_dielectric")
+    assert strips.volume_mm3.sum() == pytest.approx(16.8 * share, rel=1e-3)
+    around = [ledger.sampled(sensor, off) for off in (0.0, ledger.NEAR_MIDDLE, -ledger.NEAR_MIDDLE)]
+    wrong = {(fault.layer, fault.message.split()[0]) for fault in ledger._volumes(sensor, strips, around)}
+    assert ((5, "hanging_dielectric") in wrong) == refused

@@ -5,14 +5,17 @@ from dataclasses import replace
 from hashlib import sha256
 
 import pytest
+from filled import filled
 
+from sensorgen.cli import designs
 from sensorgen.core.bounds import Bounds
 from sensorgen.design.design import make
-from sensorgen.prediction.bodies import default_body, estimated
-from sensorgen.workflows import build
+from sensorgen.prediction.bodies import default_body, estimated, registered
+from sensorgen.workflows import build, compensation
 from sensorgen.workflows.trial import Numbers, Trial
 
 SMALL = ["tri", "--size", "12x8"]
+SIZE = {"length_mm": 12.0, "width_mm": 8.0}
 
 pytestmark = pytest.mark.usefixtures("unpressed")  # gaps, capacitances at rest and plates need no mesh
 
@@ -133,6 +136,23 @@ def test_a_build_is_compensated(run, contents, tmp_path):
     assert (found["compensated"][0]["before"], found["compensated"][0]["after"]) == (0.0, 0.2)
 
 
+def test_a_compensation_is_by_prints_of_the_slicer_that_decides(monkeypatch):
+    asked, calls = make({"shape": "reference"}), []
+
+    def by(design, walls, *, sliced, **_):
+        calls.append((design, walls, sliced))
+        return design, []
+
+    monkeypatch.setattr(compensation, "compensated", by)
+    monkeypatch.setenv("SENSORGEN_SLICER", "cura")
+    designs.compensated(asked, "print")
+    monkeypatch.setenv("SENSORGEN_SLICER", "none")
+    designs.compensated(asked, "print")
+    (_, walls, by_slicer), by_estimate = calls
+    assert (walls, by_slicer.func) == ("cura-gaps", designs.sliced)
+    assert by_estimate == (asked, "arachne", None)
+
+
 @pytest.mark.usefixtures("at_rest")
 def test_nothing_to_compensate(run):
     assert "nothing to change" in run("build", "reference", "--size", "12x8", "--no-cad", "--compensate", "print").err
@@ -172,3 +192,28 @@ def test_a_compensation_that_senses_worse_says_so(monkeypatch):
     monkeypatch.setattr(build, "trial", lambda *_, **__: fine)
     monkeypatch.setattr(build.decision, "is_known", lambda _: True)
     assert build._compared(asked, coarse).endswith(": force resolution 2 x worse, position resolution lost")
+
+
+@pytest.mark.usefixtures("at_rest")
+def test_a_file_of_another_design_is_not_taken_without_a_word(run, tmp_path):
+    """Higher than the drawing it is refused; as high, its record says so; without a record it is taken."""
+    plate, file = ("reference", "--size", "12x8"), tmp_path / "other.gcode"
+    other = make({"shape": "reference", "name": "other", "parameters": SIZE | {"dielectric_mm": 0.4}})
+    file.write_text(filled(other))
+    how = ("--gcode", str(file), "--json")
+    assert json.loads(run("predict", *plate, "--dielectric", "0.4", *how).out)["doubts"] == []
+    record = {"name": "other", "design": other.id(), "sha256": sha256(file.read_bytes()).hexdigest()}
+    file.with_name("other.gcode.json").write_text(json.dumps(record))
+    assert json.loads(run("predict", *plate, "--dielectric", "0.4", *how).out)["doubts"] == []
+    lower = run("predict", *plate, "--dielectric", "0.3", *how)
+    assert (lower.code, json.loads(lower.out)["status"]) == (2, "not predicted")
+    assert "prints up to Z 1 mm, above the top of reference-length12-width8-dielectric0.3 at 0.9 mm" in lower.line
+    same = (*plate, "--dielectric", "0.2", "--electrode", "0.4")
+    doubt, of_bodies = json.loads(run("predict", *same, *how).out)["doubts"]
+    assert of_bodies.startswith("tool 4 prints 96 mm2")
+    assert doubt.startswith("the record beside other.gcode names another design, 'other'")
+    assert doubt in run("export", *same, "--gcode", str(file), "-o", "body.stl").out
+    assert doubt in {f.message for f in registered(make({"shape": "reference", "parameters": SIZE | {
+        "dielectric_mm": 0.2, "electrode_mm": 0.4}}), file).findings()}  # fmt: skip
+    higher = json.loads(run("predict", *plate, "--dielectric", "0.6", *how).out)
+    assert any("is missing: nothing of" in one for one in higher["doubts"])

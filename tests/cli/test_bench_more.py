@@ -133,10 +133,10 @@ def test_readings_are_filtered_as_they_come(run, tmp_path):
 
 
 def test_a_stream_is_answered_row_by_row(run, tmp_path, monkeypatch):
-    table = b"re_ohm_1kHz,im_ohm_1kHz\n5,1\n,\n5,1\n"
+    table = b"re_ohm_1kHz,im_ohm_1kHz\n5,1\n,\n0,0\n5,1\n"
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(table), encoding="utf-8"))
     said = run("bench", "live", "-", "--rate", "140")
-    assert (said.code, said.out) == (0, "re_ohm_1kHz,im_ohm_1kHz\n5,1\n,\n5,1\n")
+    assert (said.code, said.out) == (0, "re_ohm_1kHz,im_ohm_1kHz\n5,1\n,\n,\n5,1\n")
     assert "a cut-off of 80 Hz at 140 samples/s" in run("bench", "live", "-", "--rate", "140", "--cutoff", "80").line
 
 

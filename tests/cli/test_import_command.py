@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -293,9 +294,20 @@ def test_without_a_map_nothing_is_imported(run, plates):
     before = sorted(Path().iterdir())
     said = run("import", *files, "--unit", "mm")
     assert said.code == WRONG_INPUT
-    assert "expected sensorgen import low.stl film.stl up.stl --map low=MATERIAL --map film=x60" in said.line
+    assert "expected sensorgen import low.stl film.stl up.stl --unit mm --map low=MATERIAL --map film=x60" in said.line
     assert said.out == run("import", *files, "--unit", "mm", "--list").out
     assert sorted(Path().iterdir()) == before
+
+
+def test_the_command_that_a_list_ends_with_can_be_pasted(run, plates):
+    """It had neither the folder of a file nor its unit, and was wrapped amid the command."""
+    Path("my parts").mkdir()
+    files = [str(Path(name).rename(Path("my parts") / name)) for name in plates()]
+    listed = run("import", *files, "--unit", "mm", "--list").out.replace("MATERIAL", "etpu")
+    command = shlex.split(listed.partition("To import it:\n")[2].replace("\\\n", " "))
+    assert command[0] == "sensorgen"
+    assert run(*command[1:]).code == 0
+    assert load(Path("low.yaml")).drawn.size_mm == (20.0, 10.0, 1.0)
 
 
 def test_a_list_writes_no_picture(run, plates):
@@ -307,6 +319,18 @@ def test_a_list_writes_no_picture(run, plates):
     assert sorted(Path().iterdir()) == before
     assert run("import", *files, "--unit", "mm", *PLATES).code == WRONG_INPUT
     assert [p.name for p in Path().iterdir() if p not in before] == ["low-faults.svg"]
+
+
+def test_a_changed_sensor_keeps_its_name(run, plates):
+    """It was named after its size: imported-length20-width10, as any other one of that size."""
+    for name, film in (("a", (0.4, 0.6)), ("b", (0.4, 0.61))):
+        files = plates(film=film, up=(film[1], 1.0))
+        assert run("import", *files, "--unit", "mm", "--name", name, *PLATES, "--force").code == 0
+    changed = (("a",), ("a", "--set", "eps_x60=3"), ("a", "--set", "eps_x60=3.1"), ("b", "--set", "eps_x60=3"))
+    cells = (run("cell", f"{name}.yaml", "--drawn", "--json", *words).out for name, *words in changed)
+    names = [json.loads(cell)["design"] for cell in cells]
+    assert [name[:2] for name in names] == ["a", "a-", "a-", "b-"]
+    assert len(set(names)) == 4
 
 
 def test_a_replaced_design_leaves_no_bodies_behind(run, plates):
@@ -425,3 +449,23 @@ def test_a_sensor_cut_to_an_outline_is_sliced_and_predicted(run, program):
     assert found["capacitance"]["value"] == pytest.approx(8.8541878128e-12 * eps * area / 0.6e-3, rel=0.02)
     assert "--border" in run("build", "reference", "--help").out
     assert "the border is 10 mm" in run("check", *words, "--size", "25x10").line
+
+
+def test_a_middle_electrode_is_read_by_stack(run, tmp_path):
+    """As the shape of the same plates; it was refused with the advice to use this command."""
+    heights = {"low": (0.0, 0.3), "under": (0.3, 0.8), "mid": (0.8, 1.1), "over": (1.1, 1.8), "up": (1.8, 2.1)}
+    maps = ["--map", "*=etpu@2", "--map", "under=x60@1", "--map", "over=x60@1"]
+    assert run("import", *stacked(tmp_path, **heights), *maps, "--name", "three").code == 0
+    said = run("stack", "three.yaml")
+    plates = {"length": 20, "width": 10, "electrode": 0.3, "lower-dielectric": 0.5, "upper-dielectric": 0.7}
+    drawn = run("stack", "double", *(word for key, value in plates.items() for word in (f"--{key}", str(value))))
+    assert (said.code, said.out) == (0, drawn.out)
+    checked = run("check", "three.yaml")
+    assert (checked.code, checked.words.startswith("PRINT three: no findings; estimated")) == (0, True)
+    assert "; not predicted" in checked.words
+    heights = {"low": (0.0, 0.3), "post": (0.3, 1.8), "mid": (0.8, 1.1), "up": (1.8, 2.1)}
+    files = stacked(tmp_path, **heights)
+    trimesh.creation.box(bounds=[(5, 2, 0.8), (15, 8, 1.1)]).export(tmp_path / "mid.stl")
+    trimesh.creation.box(bounds=[(0, 0, 0.3), (4, 10, 1.8)]).export(tmp_path / "post.stl")
+    assert run("import", *files, "--map", "*=etpu@2", "--map", "post=x60@1", "--name", "beside").code == 0
+    assert "post: beside the middle electrode, which is from 0.8 to 1.1 mm" in run("stack", "beside.yaml").line

@@ -82,6 +82,9 @@ def test_a_planted_optimum_is_found():
     assert out
     assert all(row.certified and row.discarded == "dominated" for row in out)
     assert len(search_.evaluated) < len(films)
+    spread = _robust(search_.target, search_.front[:1], front.HERE, keep=False)[search_.front[0].number]
+    smaller = 99.95 * 9.95 / (100 * 10)  # which is farther away than a larger one
+    assert spread["capacitance_pf"].worst == pytest.approx(spread["capacitance_pf"].value * smaller)
 
 
 def test_feet_in_free_fall_lose():
@@ -125,6 +128,15 @@ def test_a_target_that_nothing_meets_names_the_nearest_and_what_binds():
     assert "none of 12 designs meets the target" in words
     assert "nearest: dielectric_mm 0.1" in words
     assert not answer.remarks  # no design was evaluated: nothing is known of its doubts
+
+
+def test_the_nearest_of_equal_violations_is_the_best_by_the_objectives(plate):
+    """It was the first of them."""
+    search_ = planted(plate, [(0.5, 9, 0, 0.1), (0.1, 9, 0, 0.1), (0.3, 9, 0, 0.1)], FORCE)
+    search_.rows = [replace(row, violated={"doubt": 1.0}) for row in search_.rows]
+    assert search_.nearest().number == 2
+    search_.rows[1].violated["limit"] = 0.1
+    assert search_.nearest().number == 3
 
 
 def test_of_the_nearest_design_the_numbers_are_told():
@@ -184,6 +196,7 @@ def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch):
         ({"parameters": {"dielectric_mm": [None]}}, BadInput, "dielectric_mm.0 is None; expected a number, or text"),
         ({"objectives": {"capacitance_pf": "min"}}, BadInput, "or 'maximise', or a mapping with near"),
         ({"objectives": {"capacitance_pf": {"near": "x"}}}, BadInput, "capacitance_pf.near is 'x'; expected a number"),
+        ({"objectives": {"capacitance_pf": {"near": -4}}}, BadInput, "capacitance_pf.near is -4; expected 0 or more"),
         ({"objectives": {}}, BadInput, "expected at least one entry"),
         ({"design": 5}, BadInput, "design is 5; expected a mapping of names to values, or text"),
         ({"limits": {"capacitance_pf": {"least": 9, "most": 1}}}, BadInput, "contradict"),
@@ -216,8 +229,8 @@ def test_a_length_in_the_plane_is_varied_in_half_lines():
     assert [row.values["length_mm"] for row in search_.rows] == pytest.approx(lengths)
     row = search_.front[0]
     assert row.values["length_mm"] == pytest.approx(lengths[2])
-    wider = [design.params.length_mm for design in within_tolerance(search_.target, row.design)]
-    assert wider == pytest.approx([lengths[2] - 0.05, lengths[2] + 0.05])
+    wider = [p for d in within_tolerance(search_.target, row.design) for p in (d.params.length_mm, d.params.width_mm)]
+    assert wider == pytest.approx([lengths[2] - 0.05, 9.95, lengths[2] + 0.05, 10.05])
 
 
 def test_a_design_that_cannot_be_made_has_its_reason():

@@ -34,6 +34,19 @@ def test_json_is_plain_and_holds_the_maps(run):
     assert bounds["sigma_y_m"][3][3] is None  # on the axis of symmetry nothing tells of y
 
 
+def test_a_turned_sensor_is_the_same_sheet(run):
+    """Ridges along x and along y; against the plate of 0.3 mm, docs/conduction.md has 0.846 and 0.706."""
+    tri = ("sheet", "tri", "--size", "40x40", "--drawn", "--contacts", "corners", "--frequencies", "100kHz", "--json")
+    x, y = (json.loads(run(*tri, "--along", along).out) for along in "xy")
+    plate = 0.042 / 0.3e-3
+    assert x["sheet_resistance_ohm"]["top"] == pytest.approx(plate * np.sqrt(0.846 * 0.706), rel=1e-3)
+    assert x["sheet_resistance_ohm"] == pytest.approx(y["sheet_resistance_ohm"])
+    assert x["contacts"]["corners"]["sigma_x_m"][1][2] == pytest.approx(y["contacts"]["corners"]["sigma_x_m"][1][2])
+    doubt = "top electrode: 118.4 ohm per square along x, 98.82 ohm along y: taken as isotropic, 108.2 ohm"
+    assert [said.partition(":")[0] for said in (x["doubts"][-1], y["doubts"][-1])] == ["top electrode"] * 2
+    assert x["doubts"][-1] == doubt
+
+
 def test_twice_the_noise_is_twice_the_error(run):
     said = (run(*WORDS, "--contacts", "corners", "--json", "--noise", noise) for noise in ("0.1%", "0.2%"))
     one, two = (json.loads(each.out)["contacts"]["corners"] for each in said)

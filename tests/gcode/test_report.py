@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from sensorgen.core.document import Facts
 from sensorgen.design import materials
 from sensorgen.design.printer import load_printer
 from sensorgen.export.gcode.check import check
@@ -62,3 +63,11 @@ def test_a_feed_of_none_takes_long_but_not_for_ever():
 def test_spot_extrusion_is_purge():
     tool = check(["M83", "T3", "G1 E5", "G1 E-2", "G1 E2", "G1 X1 E.5"], DIABASE).tools[0]
     assert (tool.filament_mm, tool.purge_mm) == (5.5, 5.0)
+
+
+def test_purge_that_no_comment_tells_is_unknown():
+    found = check(["M83", "T3", "G1 X1 E.5"], DIABASE)
+    assert found.tools[0].purge_mm is None
+    rows = [row for part in found.document() if isinstance(part, Facts) for row in part.rows]
+    assert ("purged", "not counted by the file") in rows
+    assert check([";TYPE:FILL", "M83", "T3", "G1 X1 E.5"], DIABASE).tools[0].purge_mm == 0.0

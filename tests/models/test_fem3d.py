@@ -27,6 +27,18 @@ def test_rect_lies_between_its_bounds(case, rungs):
     assert rungs[case["d"]][-1].interval.width() < 1e-3
 
 
+def test_many_bricks_begin_without_layers(monkeypatch):
+    """A cell of many takes the coarse meshes first: as wide as asked for, in a fifth of the unknowns."""
+    case = CELLS["rect"][0]
+    layered = next(fem3d.steps(rect_cell(case["d"]), EPS, 3e-2))
+    monkeypatch.setattr(fem3d, "_MANY_BRICKS", 1)
+    (step,) = fem3d.steps(rect_cell(case["d"]), EPS, 3e-2)
+    assert step.interval.lower < case["C_F"] < step.interval.upper
+    assert 3.4e-3 < step.interval.width() < 3e-2
+    assert step.layers == 0
+    assert step.unknowns < layered.unknowns / 5
+
+
 def test_rungs_lie_within_each_other(rungs):
     for steps in rungs.values():
         bounds = [(s.interval.lower, s.interval.upper) for s in steps]

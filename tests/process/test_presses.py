@@ -1,13 +1,17 @@
 """Presses, pairs, drift, hysteresis and surfaces of runs whose truth is known."""
 
+from dataclasses import replace
+
 import made
 import numpy as np
 import pytest
 
 from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.measure.recording import Recording, RecordingClock, RigLog, Source, joined
+from sensorgen.measure.recording.samples import blank
 from sensorgen.measure.signal import drift, presses
 from sensorgen.measure.signal.presses import normalised, surface
-from sensorgen.measure.signal.run import hysteresis
+from sensorgen.measure.signal.run import hysteresis, of_presses, processed
 
 MADE = made.presses(12)
 RUN = made.run(MADE, rate_hz=70, creep=0.004)
@@ -47,6 +51,18 @@ def test_presses_are_found_in_readings_that_creep(begins_s, least_n):
     right = [any(abs(p.start_s - s) < 0.3 and abs(p.end_s - e) < 0.3 for p in found) for s, e, *_ in felt]
     assert sum(right) >= len(felt) - 2
     assert len(found) == sum(right)
+
+
+@pytest.mark.parametrize("ramp_s", [1e-3, 0.2])
+@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-5, 1e-3])
+def test_equal_presses_are_found_however_quiet_the_readings_are(noise, ramp_s):
+    t, rng = np.arange(0, 120, 0.02), np.random.default_rng(2)
+    starts = np.array([10.0, 30, 50, 70, 90, 105])
+    after = t[:, None] - starts
+    pressed = np.clip(np.minimum(after, 8 - after) / ramp_s, 0, 1).sum(axis=1)
+    scatter = noise * (rng.standard_normal((len(t), 2)) + 1j * rng.standard_normal((len(t), 2)))
+    z = np.array([1000 - 5000j, 900 - 500j]) * (1 - 0.05 * pressed[:, None]) * (1 + scatter)
+    np.testing.assert_allclose(presses.by_readings(t, z), np.transpose([starts, starts + 8]), atol=0.03 + ramp_s)
 
 
 def test_a_press_ends_where_the_force_is_not_known_and_short_ones_are_none():
@@ -215,6 +231,31 @@ def test_hysteresis_of_two_known_ways():
     assert hysteresis(force, values + noise).share == pytest.approx([2 / 16, 0], abs=0.06)
     with pytest.raises(BadInput, match="expected a press with loading and unloading"):
         hysteresis(force[:200], values[:200])
+
+
+def test_hysteresis_is_no_late_clock_and_its_error_has_that_of_the_clock():
+    def force(time_s):
+        """Up and down again in 12 s each, to 6 N."""
+        return 6 * np.clip(1 - np.abs(time_s % 40 - 22) / 12, 0, 1)
+
+    t, rows, rng = np.arange(0, 160, 0.02), np.arange(0, 160, 0.04), np.random.default_rng(0)
+    share = force(t) / 6
+    share += 0.2 * np.where(t % 40 > 22, 4 * share * (1 - share), 0)
+    noise = 2e-4 * (rng.standard_normal(len(t)) + 1j * rng.standard_normal(len(t)))
+    z = ((1000 - 5000j) * (1 - 0.06 * share) * (1 + noise))[:, None]
+    one = Recording(t, np.array([1.1e3]), z, blank(len(t)), RecordingClock(), Source("", "", rate_hz=50))
+    measured = force(rows) + 0.001 * rng.standard_normal(len(rows))
+    log = RigLog(rows - 2.0, force(rows), 50 + 0 * rows, measured, np.zeros(len(rows), bool))
+    clocks = joined(one, log).clocks
+    assert clocks.offset_s == pytest.approx(2, abs=4 * clocks.offset_error_s)
+    assert clocks.offset_error_s < 0.01
+    worked = processed(one, log, law="line")
+    ways = of_presses(worked).ways.values()
+    assert len(ways) == 4
+    for way in ways:  # over the span from 0.2 N on
+        assert way.share[1] == pytest.approx(0.2 / (1 - 0.2 / 6), abs=4 * way.error[1])
+    for way in of_presses(replace(worked, clock_error_s=0.1)).ways.values():  # both ways move by 0.05 N
+        assert way.error[1] == pytest.approx(2 * 0.05 / 5.8, rel=0.25)
 
 
 def test_a_surface_is_straight_between_its_presses_and_blank_beyond():

@@ -55,6 +55,18 @@ def test_a_late_block_is_no_gap():
     assert found.clock.epoch_s == pytest.approx(made.EPOCH_S + 0.03, abs=0.002)
 
 
+@pytest.mark.parametrize("stamped", [False, True])
+@pytest.mark.parametrize(("seed", "uneven"), [(1, 0.0), (2, 0.05)])
+def test_rows_that_are_cut_out_leave_a_gap_in_a_time_that_rises(stamped, seed, uneven):
+    """The first sample after each cut, of a single row too, and no other, also where steps differ by a part."""
+    time = TIME + uneven / 140 * np.random.default_rng(seed).random(len(TIME))
+    left = np.delete(np.arange(len(TIME)), [500, *range(2000, 2150)])
+    found = rebuilt(len(left), time[left], made.stamps(TIME)[left] if stamped else None)
+    np.testing.assert_array_equal(found.time_s, time[left])
+    assert np.flatnonzero(found.marks["gap"]).tolist() == [500, 1999]
+    assert not rebuilt(len(TIME), time, None).marks["gap"].any()
+
+
 def test_a_time_that_does_not_rise_is_rebuilt_from_the_index():
     broken = TIME.copy()
     broken[100:110] = np.nan
@@ -64,8 +76,48 @@ def test_a_time_that_does_not_rise_is_rebuilt_from_the_index():
     assert "does not rise everywhere" in found.notes[0]
     with pytest.raises(BadInput, match="no sampling times"):
         rebuilt(5, None, None)
-    with pytest.raises(BadInput, match="do not rise"):
+    with pytest.raises(BadInput, match="does not rise"):
         rebuilt(5, None, np.array([5.0, 4, 3, 2, 1]))
+
+
+EVEN = np.arange(6000) / 50
+CUT = EVEN[(EVEN < 40) | (EVEN >= 45)]
+
+
+def changed(place, value):
+    return np.r_[CUT[:place], value, CUT[place + len(value) :]]
+
+
+@pytest.mark.parametrize(
+    ("time", "stamps", "gap", "within_s"),
+    [
+        (CUT, None, True, 1e-9),
+        (None, made.EPOCH_S + CUT, True, 1e-5),
+        (CUT, made.EPOCH_S + CUT, True, 1e-9),
+        (EVEN[:5750], made.EPOCH_S + CUT, True, 1e-5),  # the instrument counts on where samples are lost
+        (changed(500, [CUT[499]]), None, True, 1e-9),
+        (changed(500, CUT[[501, 500]]), None, True, 1e-9),
+        (changed(500, [np.nan] * 10), None, True, 1e-9),
+        (np.round(CUT, 1), None, True, 0.02),
+        (np.round(EVEN, 1), None, False, 0.02),
+        (np.floor(EVEN), None, False, 0.02),
+        (np.round(EVEN * 50 / 70, 2), None, False, 0.01),  # rises, by steps of 0.01 s and 0.02 s
+    ],
+)
+def test_lost_rows_are_a_gap_and_rounded_times_are_none(time, stamps, gap, within_s):
+    truth = EVEN * 50 / 70 if within_s == 0.01 else CUT if gap else EVEN
+    got = rebuilt(len(truth), time, stamps)
+    np.testing.assert_allclose(got.time_s - np.median(got.time_s - truth), truth, atol=within_s)
+    assert np.flatnonzero(got.marks["gap"]).tolist() == [2000] * gap
+
+
+def test_blocks_with_stamps_alone_lose_samples_once():
+    kept = TIME[(TIME < 20) | (TIME >= 25)]
+    first = np.arange(len(kept)) // made.BLOCK * made.BLOCK
+    counted = made.stamps(np.arange(len(kept)) / 140)  # by the computer's clock, which the lost samples move on
+    got = rebuilt(len(kept), None, counted + kept[first] - first / 140)
+    np.testing.assert_allclose(got.time_s, kept - kept[0], atol=0.02)
+    assert np.flatnonzero(got.marks["gap"]).tolist() == [2800]
 
 
 # how late the blocks of a recording of the real program were stamped, over the first one [0.1 ms]

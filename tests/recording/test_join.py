@@ -35,7 +35,7 @@ def test_the_offset_is_found_within_its_error(tmp_path, run, offset_s):
     assert found.clocks.offset_error_s < 0.01
     assert found.clocks.offset_s == pytest.approx(offset_s + 0.03, abs=3 * found.clocks.offset_error_s)
     assert found.clocks.skew == 0
-    assert f"{found.clocks.offset_s:.4f} +- " in found.clocks.words()
+    assert f"clock {'+-'[offset_s < 0]} {abs(found.clocks.offset_s):.4f} +- " in found.clocks.words()
     truth, _ = made.force_at(run.time_s, MADE)
     told = np.isfinite(found.force_n)
     assert told.mean() > 0.99
@@ -57,6 +57,8 @@ def test_stamps_of_one_computer_leave_little_to_find(tmp_path, run):
     off = joined(recording(run), stamped(made.write_rig(tmp_path / "off.csv", made.rig_rows(MADE, 32.0))))
     assert off.clocks.offset_s == 0  # a response that fits 32 s later is no reason to believe that
     assert np.isnan(off.clocks.offset_error_s)
+    near = joined(recording(run), stamped(made.write_rig(tmp_path / "near.csv", made.rig_rows(MADE, 1.5))))
+    assert near.clocks.words().endswith("agree: one computer stamped both, but the force fits best more than 1 s away")
 
 
 def test_errors_of_the_offset_are_what_they_say(tmp_path):
@@ -140,6 +142,8 @@ def test_clocks_that_both_count_from_0_and_clocks_far_apart(tmp_path, run):
     shown, *others = made.rig_rows(MADE)
     same = rig(made.write_rig(tmp_path / "same.csv", [shown - made.EPOCH_S, *others]))
     assert "assumed to agree" in joined(recording(dead, stamped=False), same).clocks.words()  # both count from 0
+    with pytest.raises(BadInput, match=r"clocks, which have 0 s in common \(recording from 1\.66142e\+09 s, rig's log"):
+        joined(recording(dead), same)  # stamps since 1970, beside a rig that counts from 0
     far = rig(made.write_rig(tmp_path / "far.csv", made.rig_rows(MADE, 9000.0)))
     with pytest.raises(BadInput, match="do not overlap within 1 s"):
         joined(recording(run), far, within_s=1.0)

@@ -136,6 +136,20 @@ def test_triangles_along_the_length_have_less_resistance(of_thesis, by_hand):
     assert any(text.startswith("Direction: tri Y has 0.67 times") for text in of_thesis.findings)
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "steps"), [(5, 7, 4), (4, 9, 1000), (60, 70, 30), (40, 90, 100000), (9, 30, 1)]
+)
+def test_a_rank_sum_test_agrees_with_scipys(first, second, steps):
+    """Exact up to 20 000 orders and asymptotic beyond, with ties and without; 1 where all are alike."""
+    rng = np.random.default_rng(first)
+    one, other = rng.integers(steps, size=first) / 7, 0.05 * steps + rng.integers(steps, size=second) / 7
+    if steps == 1:
+        other = one[0] + np.zeros(second)
+    exact = math.comb(first + second, first) <= 20_000
+    method = stats.PermutationMethod(n_resamples=20_000) if exact else "asymptotic"
+    assert yields.rank_p(one, other) == pytest.approx(stats.mannwhitneyu(one, other, method=method).pvalue, rel=1e-9)
+
+
 @pytest.mark.parametrize(("shorted", "said"), [(6, "; no significant difference"), (5, "; a significant difference")])
 def test_of_two_questions_each_has_to_be_twice_as_sure(shorted, said, tmp_path):
     """6 and 5 of 10 against 12 of 12: p = 0.029 and 0.010, of which the first would do if only one thing were asked."""

@@ -54,6 +54,8 @@ def unpacked(data):
         (1e6 + np.linspace(0, 1, 7), "f8"),
         (np.arange(12).reshape(3, 4) ** 2.0, "f4"),
         (np.array([1, 2, 70_000]), "i4"),
+        (np.array([1, -2, 3]), "i4"),
+        (np.array([0, 2, 60_000]), "u2"),
     ],
 )
 def test_packed_numbers(values, kind):

@@ -60,6 +60,21 @@ def test_fits_every_width_in_both_themes(browser, made):
     assert made.stat().st_size < 3_000_000
 
 
+def test_heights_of_a_section_can_be_read(browser, tmp_path):
+    """Of a thick sensor, whose sections are longer, they were 2 to 3 px high."""
+    page = tmp_path / "thick.html"
+    page.write_text(page_of(make({"shape": "reference", "parameters": {"dielectric_mm": 3.0}})), "utf-8")
+    for width in (360, 768, 1280):
+        browser.size(width)
+        browser.open(page)
+        heights = browser.run(
+            "[...document.querySelectorAll('.section text')].map(t => t.getBoundingClientRect().height)"
+        )
+        assert len(heights) > 4
+        assert min(heights) >= 9
+        assert max(heights) < 24
+
+
 def test_electrodes_are_seen_on_a_dark_ground(browser, made):
     browser.media("light")
     browser.open(made)

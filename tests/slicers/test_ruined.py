@@ -76,3 +76,12 @@ def test_all_ruined_prints_are_refused_and_all_harmless_edits_accepted(printed):
     accepted = [fault.name for fault in faults() if (new := fault.edit(printed)) and not findings(SENSOR, new)]
     assert len(accepted) <= 2, accepted
     assert {name: found for name, edit in HARMLESS.items() if (found := findings(SENSOR, edit(printed)))} == {}
+
+
+@pytest.mark.nightly
+def test_cura_s_own_file_is_accepted_where_it_prints_the_ends_of_strips_twice(cura_engine, tmp_path):
+    """A line that joins two strips crosses the end of a third: 0.05 mm3 too much on 1 mm2."""
+    cells = {"hang_height_mm": 0.4, "dielectric_mm": 0.2}
+    sensor = design.make({"shape": "tri", "name": "joined", "parameters": cells})
+    ready = sliced([alone(sensor)], "cura", tmp_path, program=cura_engine).ready
+    assert findings(sensor, ready.read_text().splitlines()) == set()

@@ -12,6 +12,7 @@ import shapely
 from sensorgen.asprinted import ledger, nozzle
 from sensorgen.asprinted.beads import Beads, beads, connected, pieces
 from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import runs
 from sensorgen.design.design import Design
 from sensorgen.design.printer import PRIME_MM3
@@ -29,6 +30,7 @@ SOME_THIN = 0.6  # share of a tool's length that may be thin
 MOST_LAYERS = 2.5  # that a line may lie above what stands there
 PURGED_MM3 = PRIME_MM3 / 3  # that fill the nozzle after a change of tools; towers take PRIME_MM3
 _SUPPORT = "support"
+_OF_ANOTHER = ("first-layer", "layers", "material", "volume")  # rules that the print of another design breaks
 
 
 def check(
@@ -83,11 +85,8 @@ def check_motion(design: Design, motion: Motion) -> list[GcodeFinding]:
 def _of_piece(
     design: Design, paths: Paths, motion: Motion, centre_mm: Point, alone: bool, lines: Beads | None
 ) -> list[GcodeFinding]:  # fmt: skip
-    corner = np.array(centre_mm) - np.array(design.printed.size_mm[:2]) / 2
-    ends = [p[:, :2] - corner for p in (paths.start_mm, paths.end_mm)]
-    inside = ((ends[0] + ends[1]) / 2 > -design.machine.line_mm() / 4).all(1)
-    inside &= ((ends[0] + ends[1]) / 2 < np.array(design.printed.size_mm[:2]) + design.machine.line_mm() / 4).all(1)
-    waste = np.array([kind in NOT_MODEL for kind in paths.kinds])[paths.kind]
+    ends = _ends(design, paths, centre_mm)
+    inside, waste = _inside(design, ends), _waste(paths)
     model = ~waste & (paths.length_mm() > 0)
     piece = model & inside
     if not piece.any():
@@ -107,6 +106,44 @@ def _of_piece(
         *_floating(design, paths, np.logical_not(inside)),
         *_beside(paths, ends, _plan(design, layers), model & ~inside & alone, waste),
     ]
+
+
+def misfits(design: Design, paths: Paths, centre_mm: Point) -> list[GcodeFinding]:
+    """Errors of a piece whose layers, materials or volumes are not those of a design; arguments as of :func:`check`.
+
+    Raises
+    ------
+    BadInput
+        It is higher than the design: that of another one.
+    """
+    piece = _inside(design, _ends(design, paths, centre_mm)) & ~_waste(paths) & (paths.length_mm() > 0)
+    top_mm, printed_mm = design.printed.size_mm[2], float(paths.end_mm[piece, 2].max(initial=0.0))
+    if printed_mm > top_mm + design.layers.layer_mm / 2 + LEVEL_MM:
+        raise BadInput(
+            f"this G-code prints up to Z {printed_mm:g} mm, above the top of {design.name} at {top_mm:g} mm; expected "
+            "the design that it was sliced from: give that one, or slice this one"
+        )
+    if not piece.any():
+        return []
+    findings = [*_heights(design, paths, piece), *ledger.check(design, beads(design, paths, centre_mm))]
+    return [f for f in findings if f.severity == "error" and f.rule in _OF_ANOTHER]
+
+
+def _ends(design: Design, paths: Paths, centre_mm: Point) -> list[Real]:
+    """Ends of all lines from the corner of the piece [mm]."""
+    corner = np.array(centre_mm) - np.array(design.printed.size_mm[:2]) / 2
+    return [p[:, :2] - corner for p in (paths.start_mm, paths.end_mm)]
+
+
+def _inside(design: Design, ends: Sequence[Real]) -> Mask:
+    """Lines whose middle is at the place of the piece."""
+    middle, beyond = (ends[0] + ends[1]) / 2, design.machine.line_mm() / 4
+    return np.asarray(((middle > -beyond) & (middle < np.array(design.printed.size_mm[:2]) + beyond)).all(1))
+
+
+def _waste(paths: Paths) -> Mask:
+    """Lines of tower, skirt and the like."""
+    return np.asarray(np.array([kind in NOT_MODEL for kind in paths.kinds])[paths.kind])
 
 
 def _line(number: Whole, rows: Mask) -> tuple[int, int]:

@@ -8,7 +8,7 @@ and 2.9 and CuraEngine 4.13 and 5.0 for all shapes (bench/results/ledger.md).
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, reduce
+from functools import lru_cache, partial, reduce
 from itertools import groupby
 
 import numpy as np
@@ -37,7 +37,7 @@ _WINDOW = 1.1  # lines, of the window that holes and piles are looked for in
 _OPEN, _HOLE_LINES = 0.3, 2.0  # filled share of a window a line wide in a hole; least area, in line widths squared
 _PILED, _PILE_LINES = 1.7, 5.0  # as above, where lines lie upon each other
 _LOCAL = ((4.5, -0.25, 0.35), (2.3, -0.45, 0.75))  # window in lines, and shares of a layer by which a tool may be off
-_STRIPS = ((4.5, -0.15, 0.2), (2.3, -0.33, 0.45))  # as above, in layers of strips
+_STRIPS = ((4.5, -0.15, 0.2), (2.3, -0.33, 0.55))  # as above, in layers of strips
 _FOREIGN_LINES = 1.0  # area that a tool may fill further than a line from its material, in line widths squared
 _UNSUPPORTED, _ALONE = 0.2, 0.8  # filled share of the layer below that supports a line; share of a tool's lines
 _NOWHERE = 10**9  # line of the file
@@ -350,7 +350,8 @@ def _volumes(
     """Each body takes in each layer about the volume that some walls make of it."""
     bodies, line = design.printed.bodies, design.machine.line_mm()
     laid = estimate.lines(design)
-    by_walls = [estimate.layers(design.printed, design.machine, design.layers, walls, laid) for walls in estimate.RULES]
+    by_rule = partial(estimate.layers, design.printed, design.machine, design.layers, laid=laid, overlap=True)
+    by_walls = [by_rule(walls) for walls in estimate.RULES]
     printed = np.zeros((len(around[0]), len(bodies)))
     np.add.at(printed, (lines.layer, lines.body), lines.volume_mm3)
     for n, body in enumerate(bodies):

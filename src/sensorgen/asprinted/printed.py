@@ -259,12 +259,15 @@ class Printed:
         By the convention for a line's width; that of the first is the print's scene.
     lines : Beads or None
         The lines; None for an estimate.
+    doubts : tuple of str
+        Why the file may print another design.
     """
 
     design: Design
     provenance: str
     layers: Mapping[str, Sequence[LayerRegions]]
     lines: "Beads | None" = None
+    doubts: tuple[str, ...] = ()
 
     @cached_property
     def scene(self) -> Scene:
@@ -297,8 +300,8 @@ class Printed:
         return {name: connected_layers(layers, bodies, conducts) for name, layers in self.layers.items()}
 
     def remarks(self) -> dict[str, tuple[str, ...]]:
-        """By every convention, where electrodes touch, and how many pieces of conductor float."""
-        return {name: connected.remarks() for name, connected in self._connected.items()}
+        """By every convention, where electrodes touch, how many pieces of conductor float, and doubts."""
+        return {name: (*connected.remarks(), *self.doubts) for name, connected in self._connected.items()}
 
     @property
     def cell(self) -> PrintCell:
@@ -325,7 +328,8 @@ class Printed:
             )
             for short in next(iter(self._connected.values())).shorts
         ]  # fmt: skip
-        return self.design.waived([*volumes.findings(self.rows, self.design.printed), *shorts])
+        other = [Finding("13-gcode", "warning", "file", doubt, "give its own design") for doubt in self.doubts]
+        return self.design.waived([*volumes.findings(self.rows, self.design.printed), *shorts, *other])
 
 
 def body(

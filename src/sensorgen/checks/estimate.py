@@ -106,7 +106,7 @@ RULES: dict[str, Rule] = {
 
 def layers(
     scene: Scene, printer: Printer, quality: Quality, walls: str = "arachne",
-    laid: Mapping[str, LineLayout] | None = None, shift: Shift | None = None,
+    laid: Mapping[str, LineLayout] | None = None, shift: Shift | None = None, overlap: bool = False,
 ) -> list[LayerRegions]:  # fmt: skip
     """Printed part of every layer.
 
@@ -123,6 +123,8 @@ def layers(
     shift : (float, float), optional
         How far the infill of odd and of even layers lies aside, in pitches [-]; so that lines of two layers meet as
         often as those that cross do if not given.
+    overlap : bool
+        Bodies that swell into each other keep all of it: slicers print the place twice.
 
     Raises
     ------
@@ -147,7 +149,7 @@ def layers(
     for number, layer in enumerate(given):
         key = round(layer.height_mm, 12), *((name, id(region)) for name, region in layer.regions.items())
         if key not in known:
-            known[key] = _printed(layer, scene, printer, RULES[walls], laid or {})
+            known[key] = _printed(layer, scene, printer, RULES[walls], laid or {}, overlap=overlap)
         regions = dict(known[key])
         for name, mine in sparse.items():
             if mine.infill < 1 and name in regions:
@@ -180,9 +182,9 @@ def _sparse(region: Region, lines: LineLayout, line_mm: float, way: str, shift: 
 
 
 def _printed(
-    layer: LayerRegions, scene: Scene, printer: Printer, wide: Rule, laid: Mapping[str, LineLayout]
+    layer: LayerRegions, scene: Scene, printer: Printer, wide: Rule, laid: Mapping[str, LineLayout], *, overlap: bool
 ) -> dict[str, Region]:
-    """Regions that walls make of a layer; a place that two bodies swell into goes to the one that is printed first."""
+    """Regions that walls make of a layer; one that two bodies swell into is the first one's, unless they overlap."""
     length, width, _ = scene.size_mm
     regions: dict[str, Region] = {}
     # Electrodes first and support last, as their tools are.
@@ -196,7 +198,7 @@ def _printed(
             aside = scene.size_mm if wide in (cura, cura_gaps) else None
             swollen = _widened(layer, body.name, length * width, printed_width, aside)
             inside = shapely.clip_by_rect(swollen, 0.0, 0.0, length, width)
-            region, others = united(inside), shapely.get_parts(list(regions.values()))
+            region, others = united(inside), shapely.get_parts([] if overlap else list(regions.values()))
             met = np.unique(shapely.STRtree(others).query(inside, predicate="intersects")[1])
             free = shapely.difference(region, shapely.union_all(others[met])) if met.size else region
             regions[body.name] = cleaned(free)

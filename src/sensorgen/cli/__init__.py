@@ -1,5 +1,6 @@
 """The command line: words in, words out. Each command imports its work inside itself."""
 
+import gc
 import importlib
 import json
 import os
@@ -98,6 +99,7 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy loads: on small matrices threads only wait
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # to look for them takes 17 ms
     warnings.showwarning = _unseen
+    gc.set_threshold(10_000)  # rows of a log are no garbage: to look through them after every 700 takes a tenth
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by whoever started this
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))

@@ -223,7 +223,8 @@ def _hysteresis(
     """Show how far readings on the way down of each press lie from those on its way up, at the same force.
 
     For presses that go up and down again over some seconds, with the rig's log that measured the force. The distance is
-    the largest one, over the span of the readings, with the standard error that noise gives it.
+    the largest one, over the span of the readings from --threshold on, with the standard error that noise and the
+    rig's clock give it.
     Drift is taken out by a law of time alone: what the film remembers of presses is what is looked for.
 
     Parameters
@@ -337,8 +338,8 @@ def _live(measured: str, *, rate_hz: Rate, cutoff_hz: Cutoff = None) -> None:
     """Low-pass readings as they come, row by row, onto the standard output.
 
     The filter begins in the steady state of the first reading and delays by 1.5 s at the thesis's cut-off. Where a
-    reading is missing the one before is held, and its cells stay empty. Rows must come at an even --rate; columns
-    that are no readings pass as they are.
+    reading is missing or exactly 0 the one before is held, and its cells stay empty. Rows must come at an even --rate;
+    columns that are no readings pass as they are.
 
     Parameters
     ----------
@@ -348,6 +349,7 @@ def _live(measured: str, *, rate_hz: Rate, cutoff_hz: Cutoff = None) -> None:
     """
     from sensorgen.core.document import csv_row
     from sensorgen.measure.readings import readings
+    from sensorgen.measure.recording.samples import sifted
     from sensorgen.measure.signal.lowpass import CUTOFF_HZ, Live
 
     smooth = Live(rate_hz, cutoff_hz or CUTOFF_HZ)
@@ -356,6 +358,7 @@ def _live(measured: str, *, rate_hz: Rate, cutoff_hz: Cutoff = None) -> None:
         head = csv_row([*source.kept, *(f"{part}_ohm_{f}" for f in tones for part in ("re", "im"))])
         render.say(head, nl=False)
         for block in source.blocks():
+            sifted(block.impedance_ohm)
             for beside, row in zip(block.kept, smooth(block.impedance_ohm).tolist(), strict=True):
                 parts = (f"{part:.12g}" if isfinite(z.real) else "" for z in row for part in (z.real, z.imag))
                 render.say(csv_row([*beside, *parts]), nl=False)

@@ -21,7 +21,7 @@ from sensorgen.core import units
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.options import Option
 from sensorgen.design import shapes
-from sensorgen.design.walls import SLICERS, WALLS
+from sensorgen.design.walls import SLICERS, TITLES, WALLS, rule
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
@@ -298,6 +298,8 @@ def _design(base: Data, given: Data, word: str) -> "Design":
         data["name"] = chosen.name
     elif data == unnamed and "name" in base:
         data["name"] = base["name"]
+    elif "geometry" in base:  # which has no parameters to be named after
+        data["name"] = f"{str(base['name'])[:90]}-{design.digest(str(data))}"
     return design.make(data, word if _is_file(word) else "")
 
 
@@ -404,20 +406,24 @@ Compensate = Annotated[
 
 
 def compensated(
-    design: "Design", word: str, walls: str, slicer: str = "", program: str = "",
+    design: "Design", word: str, slicer: str = "", program: str = ""
 ) -> "tuple[Design, list[Adjustment]]":  # fmt: skip
-    """The design to print, and what was changed; by a real slicer's prints where one is named, else by the estimate."""
+    """The design to print, and what was changed: by prints of the slicer, the deciding one if none is named."""
     if not word:
         return design, []
+    from sensorgen.prediction.print_files import NONE, deciding
     from sensorgen.workflows.compensation import compensated as changed
 
+    decides = slicer or deciding()
+    walls = rule("prusa" if decides == NONE else decides, design.walls)
     with render.progress(("designs",)) as step:
         printable, changes = changed(
             design, walls, bake=word == "bake", stiffness=word == "stiffness",
-            sliced=partial(sliced, slicer, program=program) if slicer else None, step=step,
+            sliced=None if decides == NONE else partial(sliced, slicer, program=program), step=step,
         )  # fmt: skip
     if not changes:
-        render.say(f"--compensate {word}: nothing to change, by the estimate for {walls} walls", err=True)
+        by = f"the estimate for {walls} walls" if decides == NONE else TITLES[decides]
+        render.say(f"--compensate {word}: nothing to change, by {by}", err=True)
     return printable, changes
 
 

@@ -2,7 +2,7 @@
 
 import re
 import webbrowser
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -281,7 +281,7 @@ def report_command(
         render.write(pieces(compared, how))
         return
     path = Path(output or f"report-{_which(compared, iteration)}.{how}")
-    _write(compared, path, how)
+    _write(path, pieces(compared, how), compared.headline)
     if show_it:
         webbrowser.open(path.resolve().as_uri())
 
@@ -295,19 +295,17 @@ def _form(output: str) -> str:
 
 def _which(compared: "Report", iteration: int | None) -> str:
     """Iteration, first specimen, or all, as a part of a file's name."""
-    if iteration is not None:
-        return str(iteration)
-    return re.sub(r"\W+", "-", compared.specimens[0]) if compared.specimens else "all"
+    which = str(iteration) if iteration is not None else next(iter(compared.specimens), "all")
+    return re.sub(r"\W+", "-", which)
 
 
-def _write(compared: "Report", path: Path, how: str) -> None:
+def _write(path: Path, content: Iterator[str], headline: Sequence[str]) -> None:
     """Write the file, and print the headline and its name."""
-    from sensorgen.analysis.report import pieces
     from sensorgen.core import document, files
 
     with files.replacing(path) as target:
-        target.writelines(piece.encode() for piece in pieces(compared, how))
-    render.write(f"{line}\n" for line in document.text([*compared.headline, str(path)]))
+        target.writelines(piece.encode() for piece in content)
+    render.write(f"{line}\n" for line in document.text([*headline, str(path)]))
 
 
 def _draw(compared: "Report", folder: Path) -> None:

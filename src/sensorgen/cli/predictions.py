@@ -172,7 +172,8 @@ def cell_command(
     Parameters
     ----------
     accuracy
-        Relative width of the bounds; 1e-3 for a cross-section and 1e-2 in 3D if not given, as in all commands.
+        Relative width of the bounds, as in all commands; if not given, 1e-3 for a cross-section, 1e-2 in 3D, 2.5e-2
+        where an electrode leaves part of the plan open.
     model : NAME
         Ask this model only: columns.
     frequency_hz

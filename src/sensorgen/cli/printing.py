@@ -12,7 +12,7 @@ from sensorgen.cli.designs import Compensate, compensated, of_design
 from sensorgen.cli.options import Advising, Cluster, DesignTip, Jobs, LogFile, NoCache, Out, Strict, TimeLimit
 from sensorgen.core.errors import Unprintable
 from sensorgen.core.options import Option
-from sensorgen.design.walls import SLICERS, rule
+from sensorgen.design.walls import SLICERS
 from sensorgen.export.slicers import TIME_LIMIT_S
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def build_command(
     no_cad
         Skip the STEP file (saves about 3 s).
     force
-        Write the files even if checks report errors.
+        Write the files even if checks report errors, and end with exit code 0.
     verify
         Write nothing: compare the folder with its record and the log.
     details
@@ -113,7 +113,7 @@ def build_command(
         with LogFile().existing() as log:
             return _told(build_differences(out / design.name, design, log))
     asked = design
-    design, changes = compensated(design, compensate, design.walls)
+    design, changes = compensated(design, compensate)
     kind, budget_s = DetailedBuild if details else Built, advising.budget if advise or advising.apply else None
 
     try:
@@ -173,13 +173,12 @@ def slice_command(
     out
         Folder for the designs' folders.
     force
-        Slice even if checks of the design report errors.
+        Slice even if checks of the design report errors, and end with exit code 0 if the file has none.
     """
     from sensorgen.export.slicing import STEPS
     from sensorgen.workflows.slice import slice_design
 
-    walls = rule(slicer, design.walls)
-    design, changes = compensated(design, compensate, walls, slicer, program)
+    design, changes = compensated(design, compensate, slicer, program)
     with render.refused(design.name), render.progress(("checks", *STEPS)) as step:
         gcode = slice_design(
             design, out, slicer, program=program, time_limit_s=time_limit_s, force=force, strict=strict,
@@ -243,7 +242,7 @@ def _plan(
     no_gcode
         Leave out slicing, which takes most of the time.
     force
-        Write the files even if checks report errors.
+        Write the files even if checks report errors, and end with exit code 0 if the G-code has none.
     jobs : N
         Processes at once; one if not given.
     """

@@ -57,23 +57,26 @@ def import_command(
 
     if not 1e-4 <= chord <= 1.0:
         raise BadInput(f"--chord {chord:g}: expected 0.0001 to 1 mm")
-    assembly = reading.read(list(files), unit, chord)
-    name = name or files[0].stem
-    if only_list or assembly.errors or not maps:
-        return _listed(assembly, out, None if only_list else out / f"{name}-faults.svg")
-    bodies = assign(assembly, maps, terminals, out)
+    assembly, design_name = reading.read(list(files), unit, chord), name or files[0].stem
     more = dict(word for word in (("printer", printer), ("quality", quality)) if word[1])
-    design = write(assembly, bodies, name=name, folder=out, more=more, replace_existing=force)
+    if only_list or assembly.errors or not maps:
+        options = {"unit": unit, "chord": f"{chord:g}" * (chord != reading.CHORD_MM), "name": name} | more
+        return _listed(assembly, out, None if only_list else out / f"{design_name}-faults.svg", files, options)
+    bodies = assign(assembly, maps, terminals, out)
+    design = write(assembly, bodies, name=design_name, folder=out, more=more, replace_existing=force)
     render.deliver(design)
     return FOUND_ERRORS if design.errors else 0
 
 
-def _listed(assembly: Any, folder: Path, drawing: Path | None) -> int:
+def _listed(
+    assembly: Any, folder: Path, drawing: Path | None, named: tuple[Path, ...], options: dict[str, str]
+) -> int:  # fmt: skip
     """List bodies that are not imported, and raise the reason unless a list is all that was asked for."""
     from sensorgen.core import files
     from sensorgen.workflows.importing import BodyListing, reading
 
-    listed = BodyListing.of(assembly, folder)
+    typed = [*map(str, named), *(word for key, value in options.items() if value for word in (f"--{key}", value))]
+    listed = BodyListing.of(assembly, folder, typed)
     render.deliver(listed)
     if assembly.errors:
         first, where = assembly.errors[0], "nothing is imported"
@@ -166,6 +169,6 @@ def export_command(
 
     body_printed, _ = body.printed(design)
     assert body_printed is not None  # noqa: S101  (there is no --drawn)
-    render.say(body_printed.provenance)
+    render.say("\n".join((body_printed.provenance, *(f"doubtful: {doubt}" for doubt in body_printed.doubts))))
     for path in export(body_printed, output or Path(f"{design.name}.3mf"), voxel_mm):
         render.say(path)

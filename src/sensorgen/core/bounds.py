@@ -139,7 +139,7 @@ class Bounds:
         name, size = {"m": ("m", 1e-3), "1/kPa": ("", 1.0)}.get(self.unit) or prefix(self.value)
         low, value, high = (end / size for end in (self.lower, self.value, self.upper))
         if isinf(high):
-            return f"{value:.2g} {name}{self.unit} (error unknown)"
+            return f"{float(f'{value:.2g}'):g} {name}{self.unit} (error unknown)"
         if f"{low:.2g}" == f"{high:.2g}":
             return f"{value:.4g} {name}{self.unit}"
         least = "<" * (self.open == "lower") + _outwards(low, floor)

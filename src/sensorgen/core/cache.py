@@ -5,7 +5,6 @@ a new version of either asks anew. Deleting the folder costs time only.
 """
 
 import json
-from collections import deque
 from collections.abc import Callable, Iterator, Mapping, MutableSequence
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
@@ -80,11 +79,6 @@ def only_known() -> AbstractContextManager[Any]:
 def held_back() -> AbstractContextManager[list[tuple[Mapping[str, JSON], JSON]]]:
     """Questions and answers that would be kept, for another process to keep: one that may be ended writes nothing."""
     return _changed(_HELD_BACK, [])
-
-
-def nothing_kept() -> AbstractContextManager[Any]:
-    """Within it no answer is kept, so that each is worked out anew."""
-    return _changed(_HELD_BACK, deque(maxlen=0))
 
 
 def known(question: Mapping[str, JSON]) -> JSON | None:

@@ -19,10 +19,11 @@ Cell = str | float | int | None
 DIGITS = 4  # for people; files for programs hold all
 WIDTH = 80  # columns of a terminal
 _LEAST = 20  # columns into which words are wrapped
-MOST_ROWS = 2000  # of a table in HTML: a browser has to lay out all of them
+MOST_ROWS = 500  # of a table in HTML: a browser has to load and lay out all of them, and no one reads more
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "\\`*_{}[]<>#|!~$&"})
 _NAMES = ("specimen", "name")  # of the column that names a row, else the first
 _wrapped = partial(textwrap.wrap, width=WIDTH, break_on_hyphens=False, break_long_words=False)  # names stay whole
+_APART = frozenset(',"\r\n')  # letters for which CSV quotes a cell
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "'", "＝", "＋", "－", "＠")
 
 
@@ -122,10 +123,8 @@ class Table:
 
     def filled(self) -> "Table":
         """The table for people: without hidden columns, and those that are empty in every row."""
-        shown_columns = [
-            k for k, column in enumerate(self.columns)
-            if not column.hidden and any(row[k] not in (None, "") for row in self.cells)
-        ]  # fmt: skip
+        used = {k for row in self.cells for k, cell in enumerate(row) if cell not in (None, "")}
+        shown_columns = [k for k, column in enumerate(self.columns) if k in used and not column.hidden]
         cells = _each(self.cells, lambda row: tuple(row[k] for k in shown_columns))
         return replace(self, columns=tuple(self.columns[k] for k in shown_columns), cells=cells)
 
@@ -300,7 +299,7 @@ def _html(part: Part) -> str:
         return _tag("p", part)
     if isinstance(part, Facts):
         return _scrolled(_row(_tag("td", name), _tag("td", words)) for name, words in part.rows)
-    table, caption, count = replace(part, cells=part.cells[:MOST_ROWS]).filled(), part.caption, len(part.cells)
+    table, caption, count = replace(part, cells=tuple(part.cells[:MOST_ROWS])).filled(), part.caption, len(part.cells)
     if count > MOST_ROWS:
         caption += f" (the first {MOST_ROWS} of {count} rows; CSV has all)"
     return _scrolled(_html_list(table) if count == 1 else _html_rows(table), caption, part.key)
@@ -378,7 +377,7 @@ def apart(*blocks: Iterable[Part]) -> Iterator[Part]:
 
 def csv_row(cells: Iterable[str]) -> str:
     """Words as a row of CSV, quoted where they would come apart."""
-    quoted = ('"' + c.replace('"', '""') + '"' if any(mark in c for mark in ',"\r\n') else c for c in cells)
+    quoted = ('"' + c.replace('"', '""') + '"' if not _APART.isdisjoint(c) else c for c in cells)
     return ",".join(quoted) + "\n"
 
 

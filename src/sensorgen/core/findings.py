@@ -151,9 +151,10 @@ def verdict(findings: Sequence[Finding]) -> Verdict:
     return "CHANGE" if number["error"] else "PRINT WITH WARNINGS" if number["warning"] else "PRINT"
 
 
-def headline(name: str, findings: Sequence[Finding], source: str = "") -> str:
-    """Verdict, counts and source of all findings about a print."""
-    return f"{verdict(findings)}  {name}: {counted(counts(findings))}{source and f'; {source}'}"
+def headline(name: str, findings: Sequence[Finding], source: str = "", *, predicted: bool = True) -> str:
+    """Verdict, counts and source of all findings about a print; without numbers, of the checks alone."""
+    parts = (counted(counts(findings)), source, "" if predicted else "not predicted")
+    return f"{verdict(findings)}  {name}: {'; '.join(filter(None, parts))}"
 
 
 def counted(counts: Mapping[str, int]) -> str:

@@ -68,7 +68,7 @@ class Lazy(Sequence[Member], Generic[Member]):
 
     def where(self, wanted: Callable[[Member], bool]) -> "Lazy[Member]":
         """The members of which something holds."""
-        return self.at(k for k, member in enumerate(self) if wanted(member))
+        return Lazy(self._make, array("q", [place for place in self._places if wanted(self._make(place))]))
 
     def at(self, which: Iterable[int]) -> "Lazy[Member]":
         """Some members, in that order."""

@@ -722,9 +722,9 @@ def name_of(design: Design) -> str:
     said_if_set |= {"profile"} - design._plain()
     others = design.model_dump(include={"materials", "nozzle_mm", "tools", "infill", "shrinkage"} | said_if_set)
     if others != default.model_dump(include=set(others)):
-        parts.append(_digest(others))
+        parts.append(digest(others))
     whole = "-".join(filter(None, parts))
-    return whole if len(whole) <= 100 else f"{whole[:90].rstrip('.-_')}-{_digest(whole)}"
+    return whole if len(whole) <= 100 else f"{whole[:90].rstrip('.-_')}-{digest(whole)}"
 
 
 def _shape_in_name(design: Design) -> Iterator[str]:
@@ -750,5 +750,6 @@ def _plain(word: str) -> str:
     return re.sub("[^A-Za-z0-9._]+", "-", word).strip(".-_")
 
 
-def _digest(data: object) -> str:
+def digest(data: object) -> str:
+    """Six digits of the hash of plain data, as a part of a name."""
     return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:6]

@@ -16,10 +16,12 @@ from sensorgen.design.design import Design
 from sensorgen.design.printer import tower
 from sensorgen.design.walls import PROGRAMS, SLICERS, TITLES
 from sensorgen.export import threemf
+from sensorgen.export.gcode.check import report
 from sensorgen.export.gcode.crossings import Lifted, lift
 from sensorgen.export.gcode.motion import Paths, follow, paths_of
 from sensorgen.export.gcode.reading import text_of
 from sensorgen.export.gcode.ready import ready
+from sensorgen.export.gcode.results import FileNeeds
 from sensorgen.export.slicers import TIME_LIMIT_S, cura, prusa, run, versions
 from sensorgen.export.slicers.loads import ToolLoad, loads
 from sensorgen.export.slicers.run import Runner, find
@@ -147,6 +149,8 @@ def sliced(
     step("G-code")
     motion = follow(text)
     lifted = lift(b"".join(ready(text, motion, machine)), machine)
+    if slicer == "cura":
+        lifted = replace(lifted, text=_with_head(lifted.text, report(lifted.motion, machine)))
     with store.replacing(printable) as file:
         file.write(lifted.text)
     end = machine.end_gcode.strip().rpartition("\n")[2].strip().encode()
@@ -161,6 +165,18 @@ def sliced(
     own_seconds = time.perf_counter() - started - seconds
     findings = versions.unknown(f"{TITLES[slicer]} {version}", not_known)
     return Sliced(raw, printable, lifted, lines, slicer, version, seconds, own_seconds, findings)
+
+
+def _with_head(text: bytes, needs: FileNeeds) -> bytes:
+    """Cura's file with time [s], filament [m] and box [mm] in its head, where the engine alone leaves placeholders."""
+    values = {"TIME": f"{needs.time_s:.0f}"}
+    values["Filament used"] = " " + ", ".join(f"{tool.filament_mm / 1000:.5g}m" for tool in needs.tools)
+    for end, corner in zip(("MIN", "MAX"), needs.box_mm or (), strict=False):
+        values |= {f"{end}{axis}": f"{at:g}" for axis, at in zip("XYZ", corner, strict=True)}
+    head = text[:_HEAD]
+    for name, value in values.items():
+        head = re.sub(f"^;{name}:.*$".encode(), f";{name}:{value}".encode(), head, count=1, flags=re.MULTILINE)
+    return head + text[_HEAD:]
 
 
 def check(pieces: Sequence[Placed]) -> None:

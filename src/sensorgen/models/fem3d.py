@@ -48,6 +48,8 @@ MESHES = (  # each takes at most 3.4 times as long as the one before, on rect
     BoxMeshLevel(3, 6, 5, 2.2e-5),
     BoxMeshLevel(3, 7, 6, 9e-6),
 )
+_MANY_BRICKS = 80  # of which the first of those takes seconds: without layers a tenth of that
+_WITHOUT_LAYERS = (BoxMeshLevel(0, 3, 2, 2.9e-2), BoxMeshLevel(0, 5, 4, 1.1e-2))
 
 
 def why_not_applicable(scene: Scene) -> str | None:
@@ -105,12 +107,13 @@ def narrowed(
     Meshes are left out that miss the width if they narrow the bounds as they do on rect, and those too large for the
     memory.
     """
-    left = list(MESHES)
+    left = [*(_WITHOUT_LAYERS if (coarse.fill > 1).sum() > _MANY_BRICKS else ()), *MESHES]
+    first = left[0]
     while left:
         mesh = left.pop(0)
         fine = layered(coarse, [abs(v) for v in values], mesh.layers)
         pair = Pair.of(fine, values, mesh.order, mesh.flux_order)
-        if mesh != MESHES[0] and pair.unknowns() > _MOST_UNKNOWNS:
+        if mesh != first and pair.unknowns() > _MOST_UNKNOWNS:
             return
         bound = bounds(pair)
         yield mesh, pair, bound

@@ -193,18 +193,36 @@ def from_gcode(design: Design, file: str | Path) -> Body:
     path = Path(file)
     with reading(path):
         content = path.read_bytes()
-    return sliced(design, partial(registered, design, path), path.name, content)
+    return sliced(design, partial(registered, design, path), path.name, content + _of_another(design, path).encode())
 
 
 def registered(design: Design, path: Path) -> "Printed":
     """Print of a design by a file of G-code; parameters and errors as of :func:`from_gcode`."""
-    from sensorgen.asprinted import beads, printed
+    from sensorgen.asprinted import agreement, beads, printed
 
     try:
         placement = beads.placed(design, path)
-        return printed.body(design, placement.paths, slicer=path.name, centre_mm=placement.centre_mm)
+        wrong = agreement.misfits(design, placement.paths, placement.centre_mm)
+        body = printed.body(design, placement.paths, slicer=path.name, centre_mm=placement.centre_mm)
     except BadInput as error:
         raise error.within(str(path)) from None
+    more = f" ({len(wrong) - 1} more by gcode check --design)" if len(wrong) > 1 else ""
+    return replace(body, doubts=(*filter(None, [_of_another(design, path)]), *(f.message + more for f in wrong[:1])))
+
+
+def _of_another(design: Design, path: Path) -> str:
+    """That the record beside a file of G-code names another design; "" without one."""
+    for note in (path.with_name(f"{path.name}.json"), path.with_suffix(".json")):
+        try:
+            record = json.loads(note.read_bytes())
+            if record["sha256"] == sha256(path.read_bytes()).hexdigest() and record["design"] not in design.ids():
+                name = record["name"]
+                return (
+                    f"the record beside {path.name} names another design, {name!r:.40}: gcode check --design compares"
+                )
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):  # no record of ours
+            continue
+    return ""
 
 
 def default_body(design: Design, folder: Path | None = None) -> Body:

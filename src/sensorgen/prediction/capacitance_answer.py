@@ -65,7 +65,7 @@ class CellCapacitance(Displayed):
     seconds : float or None
         Time that all models took together, imports left out [s].
     reached : bool
-        Whether the bounds are as narrow as asked, beside what a border leaves open.
+        Whether the bounds are as narrow as asked.
     reason : str
         Why there is no answer, or "".
     accuracy : float or None
@@ -152,7 +152,7 @@ class CellCapacitance(Displayed):
         if self.model is None:
             return (f"no answer: {self.reason}",)
         best = f"accuracy {self.accuracy:g} not reached: {self.relative_width:.2g}, by {self.model}"
-        return ("; ".join((best, *self.refused)),)
+        return ("; ".join((best, *(self.doubts or self.refused))),)
 
 
 def answer(body: Body, asked: CapacitanceQuestion) -> CellCapacitance:
@@ -200,8 +200,8 @@ def _computed(body: Body, asked: CapacitanceQuestion) -> CellCapacitance:
         loss_lower_f_per_m2=loss.lower / area_m2 if loss else None,
         loss_upper_f_per_m2=loss.upper / area_m2 if loss else None,
         relative_width=total.width(), seconds=total.seconds(),
-        reached=total.width() <= total.wanted + 2 * cells.count_error * (1 + total.wanted),
-        accuracy=total.wanted if total.wanted < inf else None, known=total.known, area_m2=area_m2, tan_delta=tan_delta,
+        reached=total.reached(), accuracy=total.wanted if total.wanted < inf else None,
+        known=total.known, area_m2=area_m2, tan_delta=tan_delta,
         frequency_hz=asked.frequency_hz if loss else None, refused=total.refused, plan=total.plan, values=tuple(values),
         doubts=cells.remarks.get(next(iter(cells.scenes)), ()),
     )  # fmt: skip

@@ -606,8 +606,8 @@ def under_tops(
         return solution.stress_pa[1:][np.isfinite(ratio)], ratio[np.isfinite(ratio)]
 
     few, curves = mesh_ladder.few(own.stress_pa), {tip.block: own} if not tip.soft else {}
-    of_mesh = over_own(tip.block, few)
-    for block in [top for top in TOPS if top != tip.block] if of_mesh[0].size else ():
+    of_mesh, blocks = over_own(tip.block, few), [top for top in TOPS if top != tip.block]
+    for block in blocks if of_mesh[0].size else ():
         for loads in (sorted({*few[:2], few[-1]}), own.stress_pa):
             at, ratio = over_own(block, loads)
             ratio = ratio / np.interp(at, *of_mesh)
@@ -615,12 +615,23 @@ def under_tops(
                 break
         if at.size:
             known = stress[stress <= at.max()]
-            rises = rise[: len(known)] * np.interp(known, at, ratio)
-            end = 1 + int(np.argmin(np.append(np.diff(rises) > 0, False)))  # a coarse mesh may fall after a contact
-            if end > 1:
-                other = compression.curve(own.name, own.source, known[:end].tolist(), (1 + rises[:end]).tolist())
-                curves[block] = replace(other, within=own.within)
+            curves |= _rising(block, own, rise[: len(known)] * np.interp(known, at, ratio))
     return curves
+
+
+def _rising(name: str, own: CapacitanceCurve, rise: Real) -> dict[str, CapacitanceCurve]:
+    """A curve of other rises at the first pressures of one, by its name, as far as it rises; none if nowhere."""
+    end = 1 + int(np.argmin(np.append(np.diff(rise) > 0, False)))  # a coarse mesh may fall after a contact
+    if end == 1:
+        return {}
+    curve = compression.curve(own.name, own.source, own.stress_pa[:end], (1 + rise[:end]).tolist())
+    return {name: replace(curve, within=own.within)}
+
+
+def _few_pa(stress_pa: float) -> list[float]:
+    """A few pressures up to beyond one; to the usual last one, where it is far beyond that [Pa]."""
+    last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
+    return [last_pa * share for share in _FEW]
 
 
 def at_a_few_pressures(
@@ -662,8 +673,7 @@ def at_a_few_pressures(
         return law if law.bounded else None
     try:
         case = case_of(design, printed, model, tip)
-        last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
-        solution = pressed(case, [last_pa * share for share in _FEW], level)
+        solution = pressed(case, _few_pa(stress_pa), level)
         curve = curve_of(solution)
     except SensorgenError:
         return None

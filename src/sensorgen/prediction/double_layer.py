@@ -11,6 +11,7 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.design import imported
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design, make
 from sensorgen.design.values import MaterialValue, material_value
@@ -81,7 +82,10 @@ def stacked(
 
 
 def halves(design: Design) -> list[Design]:
-    """A double sensor as the two plates that share its middle electrode; any other design is its own only one."""
+    """A double sensor as the two sensors that share its middle electrode; any other design is its own only one."""
+    if imported.middle(design.bodies):
+        given = design.model_dump(exclude_defaults=True, mode="json")
+        return [make(given | half) for half in imported.halves(design.geometry or "", design.bodies)]
     if design.shape == "double_tri":
         data = design.model_dump(include={"printer", "quality", "tools", "material_values", "own", "materials"})
         parameters = asdict(design.params) | {"isolation_mm": 0.0}

@@ -603,6 +603,11 @@ def resolved(error: Bounds | None, most: float, cannot: str, *, conditional: boo
     ('cannot locate', '200 mN')
     >>> resolved(Bounds.of(0.12, "m", model=Interval(0.0065, 1.0)), 0.1, "cannot locate", conditional=True)
     'cannot locate, at best 6.5 mm'
+
+    Where the print may be anything, no end of the range is known.
+
+    >>> resolved(Bounds.of(0.65, "N", print=Interval(0.0, inf)), 6.0, "cannot sense force")
+    '650 mN (error unknown)'
     """
     if error is None:
         return "–"
@@ -610,7 +615,7 @@ def resolved(error: Bounds | None, most: float, cannot: str, *, conditional: boo
         return cannot
     if not error.value < identified.GUESS * most:
         return f"{cannot}, at best {si(error.lower, error.unit, 2)}"
-    if error.upper > most:
+    if error.upper > most and error.lower > 0:
         error = replace(error, upper=most, open="upper")
     return error.words()
 

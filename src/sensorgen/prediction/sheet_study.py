@@ -11,6 +11,7 @@ import numpy as np
 from sensorgen.core.document import Cell, Column, Facts, Part, Table, to_json
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM, si
+from sensorgen.design.values import ENDS
 from sensorgen.models.sensor import Sensor
 from sensorgen.models.sheet import impedance, localise
 from sensorgen.prediction.sensor_model import SensorModel
@@ -18,6 +19,7 @@ from sensorgen.solvers.sheet.parts import Contact, Port, Sheet, SheetPatch
 from sensorgen.solvers.sheet.solve import PressErrors, contact_sets, depth_m
 
 PLACES = 7  # along each side
+ISOTROPIC = 0.01  # relative difference of resistances along x and y that is no doubt
 BOUNDLESS = 1e6  # N or m: a larger error has no meaning
 Rectangle = tuple[tuple[float, float], tuple[float, float]]  # x and y, from and to [mm]
 
@@ -144,7 +146,7 @@ def study(
         A tip that leaves no place to find; as :func:`sensorgen.models.sheet.localise`.
     """
     sensor = model.sensor
-    top, bottom = (rho / h for rho, h in zip(sensor.resistivity_ohm_m, sensor.electrode_m, strict=True))
+    (top, bottom), doubts = _per_square(model)
     sheet = Sheet(
         sensor.length_m, sensor.width_m, (top, bottom), sensor.capacitance_f_per_m / sensor.width_m,
         sensor.leak_s_per_m / sensor.width_m, sensor.tan_delta,
@@ -159,7 +161,28 @@ def study(
         name: localise(sheet, pairs, frequency_hz, press, per_newton, noise, PLACES, partial(step, name))
         for name, pairs in ports.items()
     }
-    return SheetStudy(sheet, press, ports, bounds, force_n, noise, model.doubts)
+    return SheetStudy(sheet, press, ports, bounds, force_n, noise, (*model.doubts, *doubts))
+
+
+def _per_square(model: SensorModel) -> tuple[list[float], list[str]]:
+    """Sheet resistance of both electrodes, the geometric mean of both directions [ohm], and why it is doubtful.
+
+    Stretching one axis makes a sheet of two resistances isotropic, of their geometric mean.
+    """
+    from sensorgen.models import conduction
+
+    ohms, doubts, scene = list[float](), list[str](), model.body.cells.first()
+    (x_mm, y_mm, _), sensor = scene.size_mm, model.sensor
+    for end, rho, thickness_m in zip(ENDS, sensor.resistivity_ohm_m, sensor.electrode_m, strict=True):
+        along = rho / thickness_m
+        across = conduction.electrode_resistance(scene, end, rho, "y").middle() * x_mm / y_mm
+        ohms.append(float(np.sqrt(along * across)))
+        if abs(across - along) > ISOTROPIC * along:
+            doubts.append(
+                f"{end} electrode: {si(along, 'ohm')} per square along x, {si(across, 'ohm')} along y: taken as "
+                f"isotropic, {si(ohms[-1], 'ohm')}"
+            )
+    return ohms, doubts
 
 
 def _press(sensor: Sensor, tip_m: float, force_n: float) -> tuple[SheetPatch, dict[str, float]]:

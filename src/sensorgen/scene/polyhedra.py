@@ -107,8 +107,15 @@ class Polyhedron:
         return self.is_box()
 
     def levels_mm(self) -> set[float]:
-        """Heights of its corners [mm]."""
-        return {round(z, 9) for _, _, z in self.vertices}
+        """Heights of its level faces, ridges and tips; not of corners amid a flank, as a curved one has [mm]."""
+        heights = [round(z, 9) for _, _, z in self.vertices]
+        levels, rising, falling = set[float](), set[int](), set[int]()
+        for triangle in self.triangles:
+            low, *_, high = sorted(heights[number] for number in triangle)
+            levels |= {low} if low == high else set()
+            rising |= {number for number in triangle if heights[number] < high}
+            falling |= {number for number in triangle if heights[number] > low}
+        return levels | {heights[number] for number in (rising | falling) - (rising & falling)}
 
     def cut(self, axis: str, at_mm: float) -> list[Outline]:
         """Outlines in which the plane ``axis = at_mm`` cuts it, in ``PLANE[axis]`` [mm]; those with holes in parts."""

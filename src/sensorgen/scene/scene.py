@@ -398,8 +398,8 @@ def described(outline: Outline) -> str:
     return some + (", ..." if len(outline) > _SHOWN else "") or "none"
 
 
-def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
-    """The part of an outline with first coordinate between 0 and ``end_mm`` [mm], exactly.
+def clipped(outline: Iterable[Point], end_mm: float, start_mm: float = 0.0) -> Outline:
+    """The part of an outline with first coordinate between ``start_mm`` and ``end_mm`` [mm], exactly.
 
     For outlines that every vertical line meets in one piece; empty where less than a sliver is left.
     Coordinates are rounded, so that neighbours reached by different sums stay neighbours.
@@ -407,7 +407,7 @@ def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
     >>> clipped([(0, 0), (2, 0), (2, 1), (0, 1)], 1.5)
     ((0, 0), (1.5, 0.0), (1.5, 1.0), (0, 1))
     """
-    part = between([(rounded(u), rounded(v)) for u, v in outline], 0, 0.0, end_mm)
+    part = between([(rounded(u), rounded(v)) for u, v in outline], 0, start_mm, end_mm)
     points = [(u, rounded(v)) for u, v in part]
     distinct = tuple(p for k, p in enumerate(points) if p != points[k - 1])
     width = max((p[0] for p in distinct), default=0.0) - min((p[0] for p in distinct), default=0.0)

@@ -20,6 +20,9 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.core.parallel import used_s
 
 _MB = 1024  # kB
+_QUICK_S = 0.3  # runs in this process that are shorter than this are repeated, and the median counts
+_REPEATS = 5
+_AGAIN_S = 1.0  # a first run shorter than this is repeated, in case it had to import
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,7 @@ class ModelAnswer:
     Attributes
     ----------
     value : tuple of complex
-        A capacitance [F], a rise [-], or impedances [ohm].
+        A capacitance [F], a rise [-], or impedances [ohm]; empty where it has none.
     stated : float or None
         Relative error that the model states [-]; None where it states none.
     certified : bool
@@ -58,15 +61,19 @@ class TimedAnswer:
     answer : ModelAnswer
         Of the first time.
     cold, warm : Cost
-        From the start of the process, nothing stored; once more in the same process, with what it has stored.
+        From the start of a new process, None without one; once more in the same process, solved anew.
     memory_mb : float or None
         Peak of the process, libraries included [MB]; None on a system without such a record.
     """
 
     answer: ModelAnswer
-    cold: Cost
+    cold: Cost | None
     warm: Cost
-    memory_mb: float | None
+    memory_mb: float | None = None
+
+    def started_s(self) -> float:
+        """Start of the process and loading of libraries, at most [s]."""
+        return self.cold.cpu_s - self.warm.cpu_s if self.cold else 0.0
 
 
 Work = Callable[[], ModelAnswer]
@@ -105,11 +112,24 @@ def apart(work: Work) -> TimedAnswer:
 
 def measured(work: Work, before_s: float, started: float) -> TimedAnswer:
     """An answer with its costs; the first one from when ``before_s`` were used and the clock stood at ``started``."""
-    answer = work()
-    cold = Cost(used_s() - before_s, time.time() - started)
-    before_s, started = used_s(), time.time()
-    work()
-    return TimedAnswer(answer, cold, Cost(used_s() - before_s, time.time() - started), _peak_mb())
+    answer, cold = _timed(work, before_s, started)
+    _, warm = _timed(work, used_s(), time.time())
+    return TimedAnswer(answer, cold, warm, _peak_mb())
+
+
+def here(work: Work) -> TimedAnswer:
+    """Run a piece of work in this process, quick work several times, of which the median counts."""
+    taken: list[Cost] = []
+    while len(taken) < _REPEATS and sum(c.cpu_s for c in taken) < (_AGAIN_S if len(taken) == 1 else _QUICK_S):
+        answer, cost = _timed(work, used_s(), time.time())
+        taken.append(cost)
+    return TimedAnswer(answer, None, sorted(taken, key=lambda cost: cost.cpu_s)[(len(taken) - 1) // 2])
+
+
+def _timed(work: Work, before_s: float, started: float) -> tuple[ModelAnswer, Cost]:
+    with cache.held_back():
+        answer = work()
+    return answer, Cost(used_s() - before_s, time.time() - started)
 
 
 def _peak_mb() -> float | None:

@@ -1,6 +1,5 @@
 """``sensorgen chart``: time against error of every model, on scenes of known answers or for one design."""
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,8 +14,8 @@ from sensorgen.core.options import Option
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
+    from sensorgen.verification.chart.results import Chart
 
-FILES = ("chart.csv", "chart.png", "chart.html")
 QUANTITIES = ("capacitance", "compression", "line", "prediction")
 
 
@@ -45,27 +44,30 @@ def _of_design(
     from sensorgen.analysis.plots.figure import needed
     from sensorgen.core.document import to_json
     from sensorgen.prediction.query import Query
-    from sensorgen.verification.chart import plot
-    from sensorgen.verification.design_chart.results import chart
+    from sensorgen.verification.chart import design as of_design
 
     needed("matplotlib", "plotly")
     keys = quantity or QUANTITIES
     with render.progress(keys) as step:
-
-        def on(words: str) -> None:
-            step(words.partition(":")[0])
-            step(words)
-
-        measured = chart(body(design), Query(force_n=force_n), keys, budget_s=budget, step=on)
-    contents = {"chart.json": to_json(measured).encode(), "chart.csv": "".join(measured.csv()).encode()}
-    if measured.points:
-        contents |= {"chart.png": plot.png_of_design(measured)}
-    contents["chart.html"] = plot.html_of_design(measured).encode()
-    names = render.written(output, contents.items())
+        measured = of_design.chart(body(design), Query(force_n=force_n), keys, budget_s=budget, step=step)
+    names = _written(measured, output, {"chart.json": to_json(measured).encode()})
     render.deliver(measured)
     if not render.form():
         render.say("\n".join(names))
     return render.verdict(*measured.problems())
+
+
+def _written(chart: "Chart", output: Path, contents: dict[str, bytes]) -> list[str]:
+    """Names of the files of a chart, beside further ones."""
+    from sensorgen.verification.chart import plot
+
+    contents["chart.csv"] = chart.csv().encode()
+    if chart.points:
+        contents["chart.png"] = plot.png(chart)
+    contents["chart.html"] = plot.html(chart).encode()
+    if overview := plot.overview(chart):
+        contents["overview.png"] = overview
+    return render.written(output, contents.items())
 
 
 def _of_scenes(
@@ -85,30 +87,19 @@ def _of_scenes(
     as_json, --json
         Print what was measured as JSON, too.
     """
-    import csv
-    import io
-
     from sensorgen.analysis.plots.figure import needed
-    from sensorgen.verification import chart
-    from sensorgen.verification.chart import plot
+    from sensorgen.core.document import to_json
+    from sensorgen.verification.chart import scenes as standard
 
     needed("matplotlib", "plotly")
     for name in scene:
-        if name not in chart.SCENES:
-            raise UnknownName("standard scene", name, chart.SCENES)
-    names = scene or chart.SCENES
+        if name not in standard.SCENES:
+            raise UnknownName("standard scene", name, standard.SCENES)
+    names = scene or tuple(standard.SCENES)
     with render.progress(names) as step:
-        points = chart.points(names, budget, step)
-    rows = [vars(one) for one in (*points, *chart.silent(names, points))]
-    text = io.StringIO()
-    table = csv.DictWriter(text, list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n")
-    table.writeheader()
-    table.writerows(rows)
-    contents = dict(zip(FILES, (text.getvalue().encode(), plot.png(points), plot.html(points).encode()), strict=True))
-    if overview := plot.overview(points):
-        contents["overview.png"] = overview
-    where = render.written(output, contents.items())
-    render.say(escaped(json.dumps(rows, indent=2, ensure_ascii=False)) if as_json else "\n".join(where))
+        measured = standard.chart(names, budget, step)
+    where = _written(measured, output, {})
+    render.say(escaped(to_json(measured)) if as_json else "\n".join(where))
 
 
 def _begin(**given: Any) -> None:

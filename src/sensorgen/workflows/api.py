@@ -253,7 +253,7 @@ def as_printed(design: Design, gcode: str | Path | None = None, *, walls: str = 
     Raises
     ------
     BadInput
-        The file is no G-code, or prints no piece of the design's size with its tools.
+        The file is no G-code, prints no piece of the design's size with its tools, or one that is higher.
 
     Examples
     --------

@@ -102,7 +102,8 @@ class Built(Boundless, Displayed):
 
     def _head(self) -> Iterator[Part]:
         yield from compensation(self.compensated, self.compared)
-        yield headline(self.name, self.findings, self.source)
+        predicted = self.prediction.status != "not predicted"
+        yield headline(self.name, self.findings, self.source, predicted=predicted)
         yield ""
 
 

@@ -31,8 +31,8 @@ ESTIMATE_WITHIN = WITHIN | {CAPACITANCE: 0.01}  # of a changed design before it 
 PERIOD = ("parameters", "period_mm")
 PRESSURE_PA = 80e3  # 8 N on 10 x 10 mm: under which a stiffness is meant
 FARTHEST = 2.0  # distance of a change, as of moves.distance [-]
-MOST_SLICES = 6  # with that of the design as it was
-_MARGIN = 1.04  # by which strips may be narrower without a layer less: at the limit itself a slicer may drop it
+MOST_SLICES = 6  # besides that of the design that was asked for
+_MARGIN = 1.04  # by which strips may differ without another gap: at the limit a slicer may print or drop a layer
 _STEP = log(1.12)  # from one width or period to the next, in logarithms
 _SHARES = (log(0.5), log(5.0))  # of its own value, that a width or a period may take, in logarithms
 _LEAST_STEP, _LONGEST_STEP = 0.05, 0.3  # to a width that a capacitance leads to, in logarithms
@@ -100,11 +100,21 @@ def compensated(
         raise _refused(f": a film has {layers}", design, made, printed, asked)
     if search.best is None:
         raise _refused(f" of {design.name} by {walls} walls{search.fault()}", design, made, printed, asked)
-    if not after.values:
-        return now, changes
     why = "gap, capacitance and stiffness" if stiffness else "gap and capacitance"
     changes += [Adjustment(key[-1], _own(now, key), float(value), why) for key, value in after.values.items()]
-    return _named(made, design), [*changes, *_comes_out(search.before(), printed, asked)]
+    if not changes:
+        return now, []
+    before = _before(design, sliced, walls, stiffness=stiffness)
+    return _named(made, design), [*changes, *_comes_out(before, printed, asked)]
+
+
+def _before(design: Design, sliced: BodyOf | None, walls: str, *, stiffness: bool) -> Quantities:
+    """Quantities of the print of what was asked for; none where they are not known."""
+    by_rules = partial(bodies.estimated, walls=walls)
+    try:
+        return quantities(design, sliced or by_rules, stiffness=stiffness, few_periods=not sliced)
+    except SensorgenError:
+        return {}
 
 
 def _comes_out(before: Quantities, after: Quantities, asked: Quantities) -> Iterator[Adjustment]:
@@ -155,7 +165,9 @@ def _own(design: Design, key: Key) -> float:
     return float(moves.own(design, key) or 0.0)
 
 
-def quantities(design: Design, body: BodyOf, *, stiffness: bool = False) -> Quantities:
+def quantities(
+    design: Design, body: BodyOf, *, stiffness: bool = False, few_periods: bool = False
+) -> Quantities:  # fmt: skip
     """Quantities of a design's body; of an array, of a few cells without rims, counted to all of its cells.
 
     Raises
@@ -164,7 +176,7 @@ def quantities(design: Design, body: BodyOf, *, stiffness: bool = False) -> Quan
         A stiffness is asked for that is not known: of a cell that is no cross-section, or that the solver gives up.
     """
     is_array = hasattr(design.params, "fitting")
-    few = moves.short(design, periods=_PERIODS) if is_array or isinstance(body, partial) else design
+    few = moves.short(design, periods=_PERIODS) if is_array or few_periods else design
     one = of_body(body(few), stiffness=stiffness)
     sizes = [p.fitting() if hasattr(p, "fitting") else (p.length_mm, p.width_mm) for p in (design.params, few.params)]
     larger = prod(sizes[0]) / prod(sizes[1])
@@ -213,7 +225,7 @@ class CompensationSearch(Nearest):
         super().__init__(design, FARTHEST)
         self.wanted, self.walls, self.body_of, self.step = wanted, walls, sliced or bodies.drawn, step
         self.aim = dict(wanted)  # of estimates
-        self.margin = _MARGIN  # factor by which the width or period may shrink without another gap
+        self.margin = _MARGIN  # factor by which the width or period may shrink or grow without another gap
         self.widths = _widths(design, walls)
         self.estimates: dict[Candidate, Quantities] = {}
         self.prints: dict[Candidate, Quantities] = {}
@@ -221,18 +233,6 @@ class CompensationSearch(Nearest):
         self.pressed = 0
         self.works = [self._at_rest, self._checked, *[self._sliced] * bool(sliced)]
         self.works[1:1] = [self._pressed] * (STIFFNESS in wanted)
-
-    @property
-    def first(self) -> Candidate:
-        """The design as it was."""
-        return next(iter(self.estimates))
-
-    def before(self) -> Quantities:
-        """Quantities of the first design's print, also of those that the search did not need."""
-        try:
-            return self.prints.get(self.first) or self._estimate(self.first, stiffness=STIFFNESS in self.wanted)
-        except SensorgenError:
-            return self.estimates[self.first]
 
     def quantities(self, one: Candidate) -> Quantities:
         """Those of its print, where it was sliced, or of its estimate."""
@@ -298,10 +298,11 @@ class CompensationSearch(Nearest):
 
     def _at_rest(self, one: Candidate) -> Quantities:
         """Gap with the margin, and the capacitance where that is the wanted one; nothing of what cannot be made."""
-        narrower = {key: float(value) / self.margin for key, value in one.values.items() if key in self.widths}
+        widths = {key: float(value) for key, value in one.values.items() if key in self.widths}
         try:
-            for each in (one.values, {**one.values, **narrower}) if narrower else (one.values,):
-                gap = _gap_mm(moves.short(self.base, each, _PERIODS), self.walls)
+            for factor in (1.0, 1.0 / self.margin, self.margin) if widths else (1.0,):
+                near = {key: value * factor for key, value in widths.items()}
+                gap = _gap_mm(moves.short(self.base, {**one.values, **near}, _PERIODS), self.walls)
                 if abs(gap - self.wanted[GAP]) > SLIVER_MM:
                     return {GAP: gap}
             return self._estimate(one)
@@ -319,7 +320,7 @@ class CompensationSearch(Nearest):
     def _estimate(self, one: Candidate, *, stiffness: bool = False) -> Quantities:
         """Quantities of the print of a few periods by the rules of slicers, counted to the whole sensor."""
         by_rules = partial(bodies.estimated, walls=self.walls)
-        return quantities(moves.changed(self.base, one.values), by_rules, stiffness=stiffness)
+        return quantities(moves.changed(self.base, one.values), by_rules, stiffness=stiffness, few_periods=True)
 
     def _checked(self, one: Candidate) -> Quantities:
         """Those of its estimate, where no rule refuses it that lets whole periods of the first design pass.

@@ -50,7 +50,7 @@ class Decision(Boundless, CheckReport):
 
     def document(self) -> Iterator[Part]:
         """Verdict, numbers, findings and changes."""
-        yield headline(self.name, self.findings, self.source)
+        yield headline(self.name, self.findings, self.source, predicted=not self.reason)
         yield from apart(self.numbers(), listed(self.findings), self.advice.document() if self.advice else ())
 
     def page(self, printed: "Printed", held: Review, predicted: "Prediction") -> str:

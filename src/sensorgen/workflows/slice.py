@@ -18,9 +18,10 @@ from sensorgen.design.walls import SLICERS, rule
 from sensorgen.export.gcode.results import FileNeeds
 from sensorgen.export.slicers import TIME_LIMIT_S
 from sensorgen.export.slicing import Step
-from sensorgen.prediction.new_slice import SliceReport, slice_now
+from sensorgen.prediction.new_slice import NewSlice, SliceReport, slice_now
 from sensorgen.prediction.print_files import NONE, PrintFile
 from sensorgen.prediction.slices import PrintReview, combined, of_own_machine, reviewed
+from sensorgen.workflows.build import json_bytes
 from sensorgen.workflows.trial import Adjustment, compensation
 
 
@@ -91,14 +92,14 @@ def slice_design(
     strict : bool
         Take warnings for errors.
     compensated : sequence of Adjustment
-        How the design differs from the one that was asked for, for the record.
+        How the design differs from the one that was asked for, for the record; it is written too, as ``design.json``.
     step : callable
         Called with the next step, for a progress display.
 
     Raises
     ------
     Unprintable
-        The checks of the design found errors; nothing was written.
+        The checks of the design, or with ``strict`` of its print, found errors; nothing was written.
     SlicerFailed, BadInput, UnknownName
         See :func:`sensorgen.export.slicing.sliced`.
     Unwritable
@@ -112,12 +113,8 @@ def slice_design(
     sliced = slice_now(design, slicer, program=program, time_limit_s=time_limit_s, strict=strict, step=step)
     report = sliced.report
     whole = combined(design, drawn, report.slicer.words, report.of_print(), PrintFile(sliced.record(), sliced.content))
-    page = ""
-    if sliced.printed.lines and len(sliced.printed.lines.number):
-        travel = {"as sliced": sliced.lifted.before, "as written": sliced.lifted.after}
-        page = pages.of_print(
-            sliced.printed, whole.findings, {when: course.stretches() for when, course in travel.items()}
-        )
+    if strict and whole.errors(strict) and not (force or report.refused):
+        raise Unprintable(whole.findings, whole.errors(strict), whole.source)
     stem = f"{design.name}.{slicer}"
     passed, refused = (f"{stem}.gcode", f"{stem}.gcode.json"), (f"{stem}.refused.gcode", f"{stem}.refused.json")
     names, others = (refused, passed) if report.refused else (passed, refused)
@@ -125,7 +122,15 @@ def slice_design(
         **vars(report), gcode=names[0], verdict=whole.verdict, all_findings=tuple(whole.findings),
         compensated=tuple(compensated),
     )  # fmt: skip
-    return _written(result, out / design.name, sliced.content, page, others)
+    return _written(result, design, out, sliced.content, _page(sliced, whole.findings), others)
+
+
+def _page(sliced: NewSlice, findings: Sequence[Finding]) -> str:
+    """Layers of a print as a page; "" of nothing."""
+    if not (sliced.printed.lines and len(sliced.printed.lines.number)):
+        return ""
+    travel = {"as sliced": sliced.lifted.before, "as written": sliced.lifted.after}
+    return pages.of_print(sliced.printed, findings, {when: course.stretches() for when, course in travel.items()})
 
 
 def _reviewed(design: Design, slicer: str, program: str) -> PrintReview:
@@ -136,9 +141,14 @@ def _reviewed(design: Design, slicer: str, program: str) -> PrintReview:
         return reviewed(design, slicer=NONE)
 
 
-def _written(result: SlicedFile, folder: Path, content: bytes, page: str, others: tuple[str, ...]) -> SlicedFile:
+def _written(
+    result: SlicedFile, design: Design, out: Path, content: bytes, page: str, others: tuple[str, ...]
+) -> SlicedFile:  # fmt: skip
     """Put the files in place, and take away those that an earlier run has left under the other name."""
+    folder = out / design.name
     store.replace(folder / result.gcode, content)
+    if result.compensated:
+        store.replace(folder / "design.json", json_bytes(design.model_dump(mode="json")))
     stem = result.gcode.removesuffix(".gcode").removesuffix(".refused")
     note = f"{stem}.refused.json" if result.refused else f"{result.gcode}.json"
     store.replace(folder / note, document.to_json(result).encode())

@@ -3,9 +3,10 @@
 from array import array
 from collections import Counter, defaultdict
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from math import inf, isfinite, isnan, log, nan
+from typing import NamedTuple, TypeVar
 
 from sensorgen.analysis.comparison.expected import Predicted, stored_or_made
 from sensorgen.analysis.comparison.measured import Measured, readings
@@ -29,7 +30,6 @@ from sensorgen.measure.signal.verdicts import (
     electrode_and_leak,
     expected_from,
     intact_ohm,
-    least,
     verdict,
 )
 from sensorgen.prediction import bodies
@@ -38,11 +38,11 @@ from sensorgen.prediction.rest_state import electrode_resistance
 
 _MOST_LEFT_OUT = 1000  # readings that are listed for one reason
 UNTRUSTED = "shape of"  # a specimen, in the list of what was left out
+Row = TypeVar("Row")
 _MOST_HELD = 120_000  # rows in memory, in 0.1 GB: a report reads each some 16 times
 
 
-@dataclass(frozen=True, slots=True)
-class Compared:
+class Compared(NamedTuple):
     """One reading beside what was predicted of its design.
 
     Attributes
@@ -53,6 +53,8 @@ class Compared:
         None where no design is known.
     evidence, verdict : Evidence, SignalVerdict
         What the readings say by themselves, of an electrode as it is usual for its prediction and shape.
+    across_ohm : float
+        The least reading between the electrodes [ohm]; without one, 0 where they touch as printed, else nan.
     expected_ohm : Bounds or None
         Predicted reading along an electrode of the network that was measured [ohm]; None where none is predicted.
     residual : float
@@ -63,23 +65,9 @@ class Compared:
     predicted: Predicted | None
     evidence: Evidence
     verdict: SignalVerdict
-    expected_ohm: Bounds | None = field(init=False)
-    residual: float = field(init=False)
-
-    def __post_init__(self) -> None:
-        ry = min(self.evidence.ry_ohm, default=nan)
-        expected = self.predicted.along_ohm(self.across_ohm) if self.predicted else None
-        if expected and self.reading.words.wires == 4:  # which reads the electrode without leads
-            expected = expected.alone()
-        object.__setattr__(self, "expected_ohm", expected)
-        residual = log(ry / expected.value) if expected and isfinite(ry) and ry > 0 else nan
-        object.__setattr__(self, "residual", residual)
-
-    @property
-    def across_ohm(self) -> float:
-        """The least reading between the electrodes [ohm]; without one, 0 where they touch as printed, else nan."""
-        rz = self.verdict.rz_ohm
-        return 0.0 if isnan(rz) and self.evidence.touching else rz
+    across_ohm: float
+    expected_ohm: Bounds | None
+    residual: float
 
     @property
     def inside(self) -> bool | None:
@@ -88,6 +76,16 @@ class Compared:
         if expected is None or not self.evidence.ry_ohm:
             return None
         return any(expected.lower <= value <= expected.upper for value in self.evidence.ry_ohm)
+
+
+def _beside(reading: Measured, of: Predicted | None, evidence: Evidence, judged: SignalVerdict) -> Compared:
+    """A reading with its verdict, beside its prediction."""
+    across = 0.0 if isnan(judged.rz_ohm) and evidence.touching else judged.rz_ohm
+    ry, expected = min(evidence.ry_ohm, default=nan), of.along_ohm(across) if of else None
+    if expected and reading.words.wires == 4:  # which reads the electrode without leads
+        expected = expected.alone()
+    residual = log(ry / expected.value) if expected and isfinite(ry) and ry > 0 else nan
+    return Compared(reading, of, evidence, judged, across, expected, residual)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +153,7 @@ def of_iteration(
         Names of specimens, in place of an iteration.
     """
     measured = readings(log.about(Reading, iteration, specimens))
+    logged = _in_memory(measured.rows)
     left_out = list(_superseded(log, iteration, specimens))
     printed = _printed(log, left_out)
     refused = dict[str, str]()
@@ -171,24 +170,27 @@ def of_iteration(
         built[name] = body_of(design)
         stored = [p for each in ids[name] for p in log.entries(Prediction, superseded=True, design_id=each)]
         expected[name] = stored_or_made(built[name], log, stored, begun.get(name, []), left_out)
-    of_rows = [expected.get(names.get(reading.specimen, "")) for reading in measured.rows]
-    usual_ohm = _usual_ohm(measured.rows, of_rows)
-
-    partner = _partners(measured.rows)
+    of_rows = [expected.get(names.get(reading.specimen, "")) for reading in logged]
+    usual_ohm = _usual_ohm(logged, of_rows)
+    partner = _partners(logged)
 
     def compared(place: int) -> Compared:
-        reading, of = measured.rows[place], of_rows[place]
+        reading, of = logged[place], of_rows[place]
         evidence = _evidence(reading, of, usual_ohm(reading.shape, of))
         both = evidence
         if place in partner:
-            other = _evidence(measured.rows[partner[place]], of)
-            both = replace(evidence, ry_ohm=evidence.ry_ohm or other.ry_ohm, rz_ohm=evidence.rz_ohm or other.rz_ohm)
-        return Compared(reading, of, evidence, verdict(both, _intact_ohm(of, reading.words.instrument)))
+            other = _evidence(logged[partner[place]], of)
+            both = evidence._replace(ry_ohm=evidence.ry_ohm or other.ry_ohm, rz_ohm=evidence.rz_ohm or other.rz_ohm)
+        return _beside(reading, of, evidence, verdict(both, _intact_ohm(of, reading.words.instrument)))
 
-    places = range(len(measured.rows))
-    rows = Lazy([compared(k) for k in places].__getitem__ if len(places) <= _MOST_HELD else compared, places)
+    rows = _in_memory(Lazy(compared, range(len(logged))))
     ac = {reading.number for reading in measured.alternating}
     return Comparison(rows, measured.alternating, built, names, expected, (*left_out, *_first(_unused(rows, ac))))
+
+
+def _in_memory(rows: Lazy[Row]) -> Lazy[Row]:
+    """Rows, made once where memory has room for all of them."""
+    return Lazy([*rows].__getitem__, range(len(rows))) if len(rows) <= _MOST_HELD else rows
 
 
 def _partners(rows: Iterable[Measured]) -> dict[int, int]:
@@ -196,18 +198,20 @@ def _partners(rows: Iterable[Measured]) -> dict[int, int]:
 
     The latest before it counts, else the next.
     """
-    partner, latest = dict[int, int](), dict[tuple[str, bool | None, bool], int]()
-    waiting: dict[tuple[str, bool | None, bool], list[int]] = defaultdict(list)
+    partner, latest = dict[int, int](), dict[tuple[str, bool | None, int], int]()
+    waiting: dict[tuple[str, bool | None, int], list[int]] = defaultdict(list)
     for place, reading in enumerate(rows):
-        known = [any(ohm >= 0 for ohm in values) for values in (reading.y_ohm, reading.z_ohm)]
-        for along, has, other in ((True, *known), (False, *known[::-1])):
-            key = reading.specimen, reading.words.baked, along
+        known = max(reading.y_ohm, default=-1.0) >= 0, max(reading.z_ohm, default=-1.0) >= 0
+        words = reading.words
+        for k, has in enumerate(known):
+            key = words.specimen, words.baked, k
             if has:
                 latest[key] = place
-                partner |= dict.fromkeys(waiting.pop(key, ()), place)
-            elif other and key in latest:
+                if key in waiting:
+                    partner |= dict.fromkeys(waiting.pop(key), place)
+            elif known[1 - k] and key in latest:
                 partner[place] = latest[key]
-            elif other:
+            elif known[1 - k]:
                 waiting[key].append(place)
     return partner
 
@@ -336,16 +340,17 @@ def _usual_ohm(
     within: dict[tuple[str, bool], array[float]] = defaultdict(lambda: array("d"))
     every: dict[tuple[str, bool], array[float]] = defaultdict(lambda: array("d"))
     for reading, of in zip(rows, of_rows, strict=True):
-        alone, ohm = of.ry_ohm if of else None, least(_evidence(reading, None))
-        key, value = (reading.shape, alone is not None), alone.value if alone else 1.0
-        every[key].extend(each / value for each in ohm)
-        if alone:
-            within[key].extend(each / value for each in ohm if alone.lower <= each <= alone.upper)
+        alone, ohm = of.ry_ohm if of else None, min(_possible(reading.y_ohm), default=inf)
+        key = reading.shape, alone is not None
+        if ohm < inf:
+            every[key].append(ohm / alone.value if alone else ohm)
+        if alone and alone.lower <= ohm <= alone.upper:
+            within[key].append(ohm / alone.value)
     medians = {key: expected_from(within[key] or values) for key, values in every.items()}
 
     def usual(shape: str, of: Predicted | None) -> float:
         alone = of.ry_ohm if of else None
-        median = medians[shape, alone is not None]
+        median = medians.get((shape, alone is not None), nan)
         if alone is None:
             return median
         return alone.value if isnan(median) else min(max(alone.value * median, alone.lower), alone.upper)
@@ -354,12 +359,13 @@ def _usual_ohm(
 
 
 def _evidence(reading: Measured, of: Predicted | None, expected_ohm: float = nan) -> Evidence:
-    """Readings that a resistance can have; a slip below 0 is kept in the log, with a doubt."""
-    ry, rz = (
-        values if min(values, default=0.0) >= 0 else tuple(v for v in values if v >= 0)
-        for values in (reading.y_ohm, reading.z_ohm)
-    )
+    ry, rz = _possible(reading.y_ohm), _possible(reading.z_ohm)
     return Evidence(reading.specimen, ry, rz, expected_ohm, of is not None and of.touches, reading.words.batch)
+
+
+def _possible(ohm: tuple[float, ...]) -> tuple[float, ...]:
+    """Readings that a resistance can have; a slip below 0 is kept in the log, with a doubt."""
+    return ohm if min(ohm, default=0.0) >= 0 else tuple(v for v in ohm if v >= 0)
 
 
 def _intact_ohm(of: Predicted | None, instrument: str) -> float:
@@ -369,25 +375,19 @@ def _intact_ohm(of: Predicted | None, instrument: str) -> float:
     return intact_ohm(c.value if c else 0.0, TONES_HZ[0], highest)
 
 
-def _missing(row: Compared) -> list[str]:
-    """Resistances that a reading lacks for a verdict; none where another reading of the specimen has them."""
-    values = (("R_Y", row.reading.y_ohm), ("R_Z", row.reading.z_ohm))
-    return [of for of, ohm in values if not ohm] if row.verdict.word == "unknown" else []
-
-
 def _unused(rows: Iterable[Compared], alternating: Container[int]) -> Iterator[tuple[str, str]]:
+    """Readings that are of no use or of little, and why; what another one of the specimen adds is not missing."""
     for row in rows:
-        name = f"reading {row.reading.number}, {row.reading.specimen}"
+        number, y, z, words = row.reading
+        name = f"reading {number}, {words.specimen}"
         if row.predicted is None:
             yield name, "no design is known: nothing to compare it with"
-        if row.reading.number in alternating:
+        if number in alternating:
             continue
-        missing = _missing(row)
-        if len(missing) == 2:
-            yield name, "no measurement in it"
-        elif missing:
-            yield name, f"no {missing[0]}: counts for nothing where both are needed"
-        if any(value < 0 for value in (*row.reading.y_ohm, *row.reading.z_ohm)):
+        if row.verdict.word == "unknown" and not (y and z):
+            why = f"no {'R_Z' if y else 'R_Y'}: counts for nothing where both are needed"
+            yield name, why if y != z else "no measurement in it"
+        if min(*y, *z, 0.0, 0.0) < 0:
             yield name, "a resistance below 0 is no reading"
 
 

@@ -71,7 +71,7 @@ def fit(
     left_out = list(comparison.left_out)
     step("recordings")
     measured = list(_measured(log, (iteration, specimens), comparison, bench or Bench(), body_of, left_out))
-    allowing = list({row.reading.specimen: (row, reading) for row, reading in _allowing(comparison)}.values())
+    allowing = _allowing(comparison)
     unsound = frozenset(row.reading.specimen for row, _ in allowing if not usable(row))
     data = _FitData([(row.reading.specimen, reading) for row, reading in allowing if usable(row)], measured, unsound)
     names = sorted(data.specimens())
@@ -87,7 +87,10 @@ def fit(
     step("errors")
     control = data.of(apart)
     errors = *_reading_errors(control, comparison, values), *_rest_errors(control, comparison, values)
-    groups = tuple(estimates.by_group(_groups(allowing), design.slot("top_electrode")[0].name))
+    by_shape = by_key(
+        (f"{row.reading.shape} {row.reading.words.axes}".strip(), (reading, usable(row))) for row, reading in allowing
+    )
+    groups = tuple(estimates.by_group(by_shape, design.slot("top_electrode")[0].name))
     return Fit(
         iteration, specimens, seed, tuple(values), tuple(untold), errors, len(names) - len(apart),
         tuple(sorted(apart)), tuple(left_out), _fingerprint(log, (iteration, specimens)), groups=groups,
@@ -123,13 +126,6 @@ class _FitData:
         return _FitData(readings, measured, self.unsound)
 
 
-def _groups(allowing: Sequence[tuple[Compared, AllowedValues]]) -> dict[str, list[tuple[AllowedValues, bool]]]:
-    """Readings by shape and direction, each with whether its electrode is sound."""
-    return by_key(
-        (f"{row.reading.shape} {row.reading.words.axes}".strip(), (reading, usable(row))) for row, reading in allowing
-    )
-
-
 def _measured(
     log: Log, which: _Which, comparison: Comparison, bench: Bench, body_of: BodyOf, left_out: list[tuple[str, str]]
 ) -> Iterator[tuple[SpecimenEntries, str]]:
@@ -149,11 +145,10 @@ def _measured(
         yield one, print_ or specimen
 
 
-def _allowing(comparison: Comparison) -> Iterator[tuple[Compared, AllowedValues]]:
-    """Readings along electrodes, and what each of them allows."""
-    for row in comparison.rows:
-        if row.predicted and (reading := allowed(row, comparison.bodies[row.predicted.design])):
-            yield row, reading
+def _allowing(comparison: Comparison) -> list[tuple[Compared, AllowedValues]]:
+    """The last reading along the electrodes of each specimen, and what it allows."""
+    each = ((row, allowed(row, comparison.bodies[row.predicted.design])) for row in comparison.rows if row.predicted)
+    return [*{row.reading.specimen: (row, reading) for row, reading in each if reading}.values()]
 
 
 def held_back(names: Sequence[str], seed: int, share: float = HELD_BACK) -> frozenset[str]:

@@ -244,6 +244,7 @@ def packed(values: NDArray[Any] | Sequence[float]) -> dict[str, str]:
     finite = array[np.isfinite(array)]
     # values that differ little for their size would show steps in single precision
     fine = bool(finite.size and np.ptp(finite) < 1e-4 * np.abs(finite).max())
-    small = array.astype("<i4" if array.dtype.kind in "iu" else "<f8" if fine else "<f4")
+    whole = array.dtype.kind in "iu" and ("<u2" if np.array_equal(array, array.astype("<u2")) else "<i4")
+    small = array.astype(whole or ("<f8" if fine else "<f4"))
     data = {"dtype": small.dtype.str[1:], "bdata": base64.b64encode(small.tobytes()).decode()}
     return data | ({"shape": ", ".join(map(str, array.shape))} if array.ndim > 1 else {})

@@ -192,7 +192,7 @@ def hysteresis(loads: "Mapping[float, Hysteresis]", tones_hz: Real, name: str) -
 def schedule(steps: "Sequence[Step]", seconds: float) -> Figure:
     """Plan of a run: force over position in the order of the run, and force over time."""
     force, position = np.array([s.force_n for s in steps]), np.array([s.position_mm for s in steps])
-    order = Map(position, force, np.arange(1.0, len(steps) + 1), "load")
+    order = Map(position, force, np.arange(1.0, len(steps) + 1), "number of the load")
     edges = [(0.0, 0.0)]
     for s in steps:
         end_s = s.start_s + s.dwell_s

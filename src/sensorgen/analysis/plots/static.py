@@ -122,7 +122,8 @@ def _titled(axes: "Axes", panel: Panel, below: Sequence[Panel], before: Sequence
         axes.set(xlabel=panel.x.title, ylabel=panel.y.title, zlabel=panel.z.title)
         return
     axes.set_xlabel("" if below and below[0].x.title == panel.x.title else panel.x.title)
-    axes.set_ylabel("" if before and before[0].y.title == panel.y.title else panel.y.title)
+    alike = before and before[0].y.title == panel.y.title and type(before[0].content[0]) is type(panel.content[0])
+    axes.set_ylabel("" if alike else panel.y.title)
 
 
 _SCALES = {False: "linear", True: "log"}

@@ -8,7 +8,7 @@ of triangles and of the ends of edges. Patterns that repeat become repeated byte
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -49,11 +49,12 @@ class SectionFigure:
         Heights of the layers in the picture [mm], and a label for some of them.
     across : int
         Axis along the section, 0 for x [-].
-    end_mm, top_mm : float
-        How much of it is shown, and the height of its upper edge [mm].
+    start_mm, end_mm, top_mm : float
+        The part of it that is shown, and the height of its upper edge [mm].
     """
 
     across: int
+    start_mm: float
     end_mm: float
     top_mm: float
     caption: str
@@ -73,27 +74,30 @@ def _figure(
 ) -> SectionFigure:
     height = max(drawn.size_mm[2], printed.size_mm[2])
     length = _PERIODS * view.repeat_mm() or _HEIGHTS * height
-    end = min(max(length, 2 * height), _WIDEST * height, view.extent_mm)
-    shown = replace(view, end_mm=round(end, 2))
-    axis, at = shown.normal, shown.section.at_mm
+    end = round(min(max(length, 2 * height), _WIDEST * height, view.extent_mm), 2)
+    shown = view.first(end)
+    axis, at, start = shown.normal, shown.section.at_mm, shown.start_mm
     of_drawing = by_key((body.name, outline) for body, outline in shown.regions)
     of_print = {
-        body.name: [part for p in body.pieces for o in p.cut(axis, at) if (part := clipped(o, shown.end_mm))]
+        body.name: [part for p in body.pieces for o in p.cut(axis, at) if (part := clipped(o, shown.end_mm, start))]
         for body in printed.bodies
     }  # fmt: skip
-    margin = _MARGIN * shown.end_mm
+    margin = _MARGIN * end
     label = max(1, round(len(boundaries_mm) * margin / height / 0.8))
     return SectionFigure(
-        AXES.index(shown.section.across), shown.end_mm, height,
-        f"{axis} = {at:g} mm, {shown.section.across} from 0 to {shown.end_mm:g} of {view.extent_mm:g} mm, true scale",
-        (-2.2 * margin, -margin / 2, shown.end_mm + 2.7 * margin, height + margin),
-        tuple(_paths(of_drawing, names, height)), tuple(_paths(of_print, names, height)),
+        AXES.index(shown.section.across), start, shown.end_mm, height,
+        f"{axis} = {at:g} mm, {shown.section.across} from {start:g} to {shown.end_mm:g} of {view.extent_mm:g} mm, "
+        "true scale",
+        (-2.2 * margin, -margin / 2, end + 2.7 * margin, height + margin),
+        tuple(_paths(of_drawing, names, height, start)), tuple(_paths(of_print, names, height, start)),
         tuple((height - z, f"{z:g}" if k % label == 0 else "") for k, z in enumerate(boundaries_mm) if z <= height),
     )  # fmt: skip
 
 
-def _paths(outlines: dict[str, list[Outline]], names: Sequence[str], height_mm: float) -> Iterator[tuple[int, str]]:
-    frame = ViewFrame(0.0, height_mm, 0.0, 0.0, 1.0, 1.0)
+def _paths(
+    outlines: dict[str, list[Outline]], names: Sequence[str], height_mm: float, start_mm: float
+) -> Iterator[tuple[int, str]]:
+    frame = ViewFrame(0.0, height_mm, 0.0, 0.0, 1.0, 1.0, start_mm)
     for name, each in outlines.items():
         yield names.index(name), "".join(map(frame.outline, each))
 
@@ -149,7 +153,8 @@ def page(
     data = block(header, {"drawn": scene, "printed": printed.scene}, names)
     sheet = draw(design, review, printed.scene, printed.provenance)
     return pages.render(
-        "sensorgen.analysis.preview", "preview.html", headline=headline(design.name, review.findings, review.source),
+        "sensorgen.analysis.preview", "preview.html",
+        headline=headline(design.name, review.findings, review.source, predicted=predicted.status != "not predicted"),
         title=design.name, verdict=review.verdict, bodies=layers.bodies(design),
         provenance=printed.provenance, printer=f"{design.machine.name}, {design.layers.name}",
         size=" × ".join(f"{side:g}" for side in scene.size_mm), layers=len(printed.first),

@@ -333,12 +333,10 @@ def comma_separated(report: Report) -> Iterator[str]:
     """Every cell of every table in a row of its own: table, row, column, unit, value."""
     yield "table,row,column,unit,value\n"
     for table in report.tables:
+        heads = [csv_row((column.name, column.unit, "")).rstrip() for column in table.columns]
         for number, row in enumerate(table.cells, 1):
-            named = (table.key, str(number))
-            yield "".join(
-                csv_row((*named, column.name, column.unit, spreadsheet(cell)))
-                for column, cell in zip(table.columns, row, strict=True)
-            )
+            cells = ((head, csv_row([spreadsheet(cell)])) for head, cell in zip(heads, row, strict=True))
+            yield "".join(f"{table.key},{number},{head}{cell}" for head, cell in cells)
 
 
 class _Listed(list[Any]):

@@ -5,10 +5,10 @@ frequency, complex where Z is. One parameter is moved for all of them until :mat
 the part of that sum that it takes away.
 """
 
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from itertools import groupby
 from math import exp, inf, log, nan, sqrt
 from typing import Annotated, Any
@@ -29,23 +29,23 @@ RESISTIVITY, PERMITTIVITY, MODULUS, FILM, LEAK = PARAMETERS = (
     "electrode resistivity", "film permittivity", "all moduli", "film thickness", "film leakage",
 )  # fmt: skip
 _FACTOR, _LEAK_S = (1e-2, 1e2), (1e-12, 1e3)
-_GRID = 31
+_GRID, _CLOSE = 31, 1e-6  # values of a parameter at first, and the step in its ln at last
 _STEP = 1e-3
 _OPEN = log(1e6)  # a larger factor is shown as this one: nothing is known
 _FLAT = 1e-9  # share below which a parameter has no effect
 
-Model = Callable[[str, float], Complex]
+Model = Callable[[str, float], Real | Complex]
 
 
 @dataclass(frozen=True, eq=False)
 class MeasurementKind:
-    """A kind of measurement: ln of the measured values, and of the predicted ones with one parameter moved.
+    """A kind of measurement: ln of the measured values, real or complex, and of the predicted, one parameter moved.
 
     A leakage of 0 and a factor of 1 are the prediction itself.
     """
 
     name: str
-    measured: Complex
+    measured: Real | Complex
     model: Model
 
 
@@ -79,14 +79,10 @@ def sentences(explanations: Sequence[Explanation]) -> Iterator[str]:
             by = f"of {best.value:.3g} S" if best.parameter == LEAK else f"scaled by {best.value:.3g}"
             share = f"{best.share_percent:.3g} % of the squared residuals"
             yield f"{kind.capitalize()}: {best.parameter} {by} explains {share}."
-    if explanations:
-        yield from _unconstrained({e.parameter for e in explanations if not e.share_percent <= 100 * _FLAT})
-
-
-def _unconstrained(constrained: Container[str]) -> Iterator[str]:
-    *first, last = ["", *(p for p in PARAMETERS if p not in constrained)]
-    if last:
-        yield f"These readings cannot constrain {' or '.join(filter(None, (', '.join(first[1:]), last)))}."
+    constrained = {e.parameter for e in explanations if not e.share_percent <= 100 * _FLAT}
+    others = [p for p in PARAMETERS if p not in constrained]
+    if explanations and others:
+        yield f"These readings cannot constrain {' or '.join(filter(None, (', '.join(others[:-1]), others[-1])))}."
 
 
 def _resistances(comparison: Comparison) -> Iterator[MeasurementKind]:
@@ -99,11 +95,10 @@ def _resistances(comparison: Comparison) -> Iterator[MeasurementKind]:
     kind = np.dtype([(name, "f8") for name in ("y", "z", "expected", "alone", "leak")] + [("apart", "?")])
     known = np.fromiter(rows, kind)
     if len(known):
-        yield MeasurementKind("electrode resistance", np.log(known["y"]).astype(complex), _along(known))
+        yield MeasurementKind("electrode resistance", np.log(known["y"]), _along(known))
     both = known[(known["z"] > 0) & known["apart"]]
     if len(both):
-        measured = np.log(np.minimum(both["z"], INTACT_OHM)).astype(complex)
-        yield MeasurementKind("film resistance", measured, _across(both["alone"]))
+        yield MeasurementKind("film resistance", np.log(np.minimum(both["z"], INTACT_OHM)), _across(both["alone"]))
 
 
 def _along(known: Any) -> Model:
@@ -111,9 +106,9 @@ def _along(known: Any) -> Model:
     leak, expected = np.nan_to_num(known["leak"], posinf=np.inf), np.log(known["expected"])
     measured = np.log(_carried(known["alone"], leak))
 
-    def model(parameter: str, value: float) -> Complex:
+    def model(parameter: str, value: float) -> Real:
         more = np.log(_carried(known["alone"], leak + value)) - measured if parameter == LEAK else 0.0
-        return np.asarray(expected + more + (log(value) if parameter == RESISTIVITY else 0.0) + 0j)
+        return np.asarray(expected + more + (log(value) if parameter == RESISTIVITY else 0.0))
 
     return model
 
@@ -128,9 +123,9 @@ def _across(alone: Real) -> Model:
     """Ln of predicted readings across a film, once for electrodes that are alike: many readings are of few designs."""
     distinct, of = np.unique(alone, return_inverse=True)
 
-    def model(parameter: str, value: float) -> Complex:
+    def model(parameter: str, value: float) -> Real:
         leak = value if parameter == LEAK else 0.0
-        return np.asarray(np.log([complex(min(across_ohm(ohm, leak), INTACT_OHM)) for ohm in distinct.tolist()])[of])
+        return np.asarray(np.log([min(across_ohm(ohm, leak), INTACT_OHM) for ohm in distinct.tolist()])[of])
 
     return model
 
@@ -179,24 +174,23 @@ def _moves(of: Movable, parameter: str, value: float) -> dict[str, float]:
 
 
 def _explained(kind: MeasurementKind, parameter: str) -> Explanation:
-    from scipy.optimize import minimize_scalar
-
     start, unit = (0.0, "S") if parameter == LEAK else (1.0, "factor")
     low, high = np.log(_LEAK_S if parameter == LEAK else _FACTOR)
 
+    @cache
     def left(at: float) -> float:
         try:
-            return float((np.abs(kind.measured - kind.model(parameter, exp(at))) ** 2).sum())
+            residual = kind.measured - kind.model(parameter, exp(at))
+            return float(np.vdot(residual, residual).real)
         except SensorgenError:  # loads that a film so soft cannot bear
             return inf
 
-    before = float((np.abs(kind.measured - kind.model(parameter, start)) ** 2).sum())
-    grid = np.linspace(low, high, _GRID)
-    sums = [left(at) for at in grid]
-    best = int(np.argmin(sums))
-    around = grid[max(best - 1, 0)], grid[min(best + 1, _GRID - 1)]
-    done = minimize_scalar(left, bounds=around, method="bounded", options={"xatol": 1e-7})
-    at, least = min((float(done.x), float(done.fun)), (float(grid[best]), sums[best]), key=lambda pair: pair[1])
+    grid = np.linspace(low, high, _GRID).tolist()
+    at, step, before = min(grid, key=left), grid[1] - grid[0], left(log(start) if start else -inf)
+    while step > _CLOSE:
+        step /= 2
+        at = min((max(at - step, low), at, min(at + step, high)), key=left)
+    least = left(at)
     share = 1 - least / before if before > 0 else 0.0
     if share < _FLAT:
         slope = _slope(kind, parameter, log(start)) if start else 0.0

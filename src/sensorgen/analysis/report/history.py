@@ -2,6 +2,7 @@
 
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -9,6 +10,7 @@ from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.report.alternating import BAKED, F_PER_PF, AcRow, at_text
 from sensorgen.core.document import Cell, Column
 from sensorgen.core.errors import BadInput
+from sensorgen.core.lazy import Lazy, by_key
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log import Log
 
@@ -79,7 +81,9 @@ def calibration_findings(calibrations: "Sequence[Calibration]") -> Iterator[str]
         yield from (f"{one.specimen}: {note}." for note in one.notes)
 
 
-_UNTOLD = None, "", ""  # bake, defects and remark of a reading of which none is known
+_ByFrequency = dict[float, tuple[float, float]]  # C [pF], and its ratio to the predicted one
+_State = tuple[bool | None, str, str]  # bake, defects and remark
+_UNTOLD = None, "", ""  # of a reading of which none is known
 
 
 @dataclass(frozen=True)
@@ -101,33 +105,26 @@ class HistoryRow:
     verdict: Annotated[str, Column("verdict")]
 
 
-def rows(comparison: Comparison, ac: Sequence[AcRow]) -> list[HistoryRow]:
+def rows(comparison: Comparison, ac: Sequence[AcRow]) -> Lazy[HistoryRow]:
     """A row for each reading of which a bake, shrinkage, a defect or a remark is known and new."""
-    measured: dict[int, dict[float, tuple[float, float]]] = {}
-    for one in ac:
-        measured.setdefault(one.number, {})[one.frequency_hz] = one.c_pf, one.c_ratio
-    listed, before = [], dict[str, tuple[Compared, dict[float, float]]]()  # the reading before, C in its state [pF]
+    measured = by_key((one.number, one) for one in ac)
+    shrinkages = {name: body.design.shrinkage for name, body in comparison.bodies.items()}
+    listed, before = [], dict[str, tuple[Compared, _State, dict[float, float]]]()  # the last, its state, C in it [pF]
     for row in comparison.rows:
         name = row.reading.specimen
-        body = comparison.bodies.get(comparison.names.get(name, ""))
-        shrinkage = body.design.shrinkage if body else 0.0
-        was, c_pf = before.get(name, (None, dict[float, float]()))
-        c, state = measured.get(row.reading.number, {}), _state(row)
-        if (state != _UNTOLD or shrinkage) and (was is None or state != _state(was)):
-            change = _since(row, was, c_pf, c) if was else _by_prediction(row, c)
-            listed.append(_row(row, change, shrinkage))
+        shrinkage = shrinkages.get(comparison.names.get(name, ""), 0.0)
+        was, then, c_pf = before.get(name) or (None, None, {})
+        c = {one.frequency_hz: (one.c_pf, one.c_ratio) for one in measured.get(row.reading.number, ())}
+        state = row.reading.words.baked, row.reading.words.defects, row.reading.words.remark
+        if (state != _UNTOLD or shrinkage) and state != then:
+            listed.append(partial(_row, row, was, c_pf, c, shrinkage))
             c_pf = {}
-        before[name] = row, c_pf | {f: pf for f, (pf, _) in c.items()}
-    return listed
+        before[name] = row, state, c_pf | {f: pf for f, (pf, _) in c.items()}
+    return Lazy(lambda k: listed[k](), range(len(listed)))
 
 
-def _state(row: Compared) -> tuple[bool | None, str, str]:
-    words = row.reading.words
-    return words.baked, words.defects, words.remark
-
-
-def _row(row: Compared, change: "_Change", shrinkage: float) -> HistoryRow:
-    words = row.reading.words
+def _row(row: Compared, was: Compared | None, pf: dict[float, float], c: _ByFrequency, shrinkage: float) -> HistoryRow:
+    words, change = row.reading.words, _since(row, was, pf, c)
     lowest, bake = min(change.c, default=None), "" if words.baked is None else BAKED[words.baked]
     return HistoryRow(
         row.reading.number, row.reading.specimen, bake, 100 * shrinkage or None, words.defects,
@@ -147,18 +144,16 @@ class _Change(NamedTuple):
     baked: bool = False
 
 
-def _since(row: Compared, was: Compared, pf: dict[float, float], c: dict[float, tuple[float, float]]) -> _Change:
+def _since(row: Compared, was: Compared | None, pf: dict[float, float], c: _ByFrequency) -> _Change:
+    if was is None:
+        expected = row.predicted.ry_ohm if row.predicted else None
+        electrode = _ratio(row.verdict.ry_ohm, expected.value if expected else nan)
+        return _Change("prediction", electrode, nan, {f: ratio for f, (_, ratio) in c.items()})
     now, then = row.verdict, was.verdict
     baked = bool(was.reading.words.baked is False and row.reading.words.baked)
     ratios = {f: value / pf[f] for f, (value, _) in c.items() if f in pf}
     electrode, film = _ratio(now.ry_ohm, then.ry_ohm), _ratio(now.rz_ohm, then.rz_ohm)
     return _Change(f"reading {was.reading.number}", electrode, film, ratios, baked)
-
-
-def _by_prediction(row: Compared, c: dict[float, tuple[float, float]]) -> _Change:
-    expected = row.predicted.ry_ohm if row.predicted else None
-    electrode = _ratio(row.verdict.ry_ohm, expected.value if expected else nan)
-    return _Change("prediction", electrode, nan, {f: ratio for f, (_, ratio) in c.items()})
 
 
 def _ratio(now: float, before: float) -> float:
@@ -167,7 +162,7 @@ def _ratio(now: float, before: float) -> float:
 
 def findings(rows: Sequence[HistoryRow]) -> Iterator[str]:
     """Sentences about changes by bakes and defects, where one specimen has them."""
-    if len({row.specimen for row in rows}) > 1:
+    if any(row.specimen != rows[0].specimen for row in rows):
         return
     for row in rows:
         changes = {

@@ -90,7 +90,8 @@ def _tools(motion: Motion, machine: Printer, loaded: dict[int, str], texts: mate
         except (MissingValue, UnknownName):
             density = None
         mass_g = None if density is None else volume_mm3 * density * 1e-6
-        yield ToolMaterial(tool, material, length_mm, purge_mm, volume_mm3, mass_g)
+        is_counted = purge_mm > 0 or any(motion.kinds)  # else no comment says what lines are
+        yield ToolMaterial(tool, material, length_mm, purge_mm if is_counted else None, volume_mm3, mass_g)
 
 
 def check(

@@ -68,12 +68,12 @@ def merged(findings: Iterable[GcodeFinding]) -> tuple[GcodeFinding, ...]:
 
 @dataclass(frozen=True)
 class ToolMaterial:
-    """Material of one tool: filament and its part that is no body [mm], volume [mm3], mass [g] where known."""
+    """Material of one tool: filament, its part that is no body [mm] where known, volume [mm3], mass [g] where known."""
 
     tool: Annotated[int, Column("tool")]
     material: Annotated[str, Column("material")]
     filament_mm: Annotated[float, Column("filament", "mm")]
-    purge_mm: Annotated[float, Column("purged", "mm")]
+    purge_mm: Annotated[float | None, Column("purged", "mm")]
     volume_mm3: Annotated[float, Column("volume", "mm3")]
     mass_g: Annotated[float | None, Column("mass", "g")]
 
@@ -113,6 +113,8 @@ class FileNeeds:
             ("tool changes", str(self.tool_changes)),
             ("layers", str(self.layers or "not counted by the file")),
         ]
+        if any(tool.purge_mm is None for tool in self.tools):
+            facts.append(("purged", "not counted by the file"))
         if self.box_mm:
             spans = (f"{axis} {low:g} to {high:g}" for axis, low, high in zip("xyz", *self.box_mm, strict=True))
             facts.append(("printed", f"{', '.join(spans)} mm {self.PLACES}"))

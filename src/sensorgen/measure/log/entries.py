@@ -427,6 +427,7 @@ _PLAIN: dict[type[Entry], dict[str, type | None]] = {  # type that a field's val
     for kind, held in _HELD.items()
 }
 _USUAL = {kind: {name: usual for name, (_, usual) in held.items()} for kind, held in _HELD.items()}
+_FIELDS = {kind: itemgetter(*usual) for kind, usual in _USUAL.items()}
 _OPTIONAL = {kind: {f.name: f.default for f in fields(kind) if f.default is not MISSING} for kind in COLUMNS}
 _REQUIRED = {kind: {name for name, (_, usual) in held.items() if usual is MISSING} for kind, held in _HELD.items()}
 
@@ -440,12 +441,9 @@ def content_of(entry: Entry) -> dict[str, Any]:
         A value that the field cannot have.
     """
     kind = type(entry)
-    types, plain, usual = _HELD[kind], _PLAIN[kind], _USUAL[kind]
-    row = itemgetter(*usual)(vars(entry))
+    row, usual = _FIELDS[kind](vars(entry)), _USUAL[kind]
     data = dict(compress(zip(usual, row, strict=True), map(ne, row, usual.values())))
-    for name, value in data.items():
-        if type(value) is not plain[name]:
-            _checked(name, types[name][0], list(value) if isinstance(value, tuple) else value, kind)
+    _values(kind, data)
     return data
 
 
@@ -472,12 +470,7 @@ def decode(kind: type[_Kind], content: str, number: int, logged_at: str) -> _Kin
         strange, missing = data.keys() - kinds.keys(), [name for name in kinds if name in _REQUIRED[kind] - data.keys()]
         wrong = f"has {min(strange)!r:.40}" if strange else f"lacks {missing[0]!r}"
         raise BadInput(f"a {kind.__name__} {wrong}; expected {', '.join(kinds)}")
-    plain = _PLAIN[kind]
-    values = {
-        name: value if type(value) is plain[name] else _checked(name, kinds[name][0], value, kind)
-        for name, value in data.items()
-    }
-    row = _row(kind, {**_OPTIONAL[kind], **values, "number": number, "logged_at": logged_at})
+    row = _row(kind, {**_OPTIONAL[kind], **_values(kind, data), "number": number, "logged_at": logged_at})
     if isinstance(row, Reading):
         row.__post_init__()
     return row
@@ -502,11 +495,16 @@ def _object(content: str) -> dict[str, Any] | None:
     return data if isinstance(data, dict) else None
 
 
-def _checked(name: str, kinds: _Kinds, value: Any, kind: type[Any]) -> Value:
-    try:
-        return _value(kinds, value)
-    except (TypeError, ValueError):
-        raise BadInput(f"column {name} of a {kind.__name__} holds {value!r:.60}") from None
+def _values(kind: type[Entry], data: Mapping[str, Any]) -> dict[str, Value]:
+    """Values of a record's fields; BadInput where one cannot have its value."""
+    values, plain = dict(data), _PLAIN[kind]
+    for name, value in data.items():
+        if type(value) is not plain[name]:
+            try:
+                values[name] = _value(_HELD[kind][name][0], value)
+            except (TypeError, ValueError):
+                raise BadInput(f"column {name} of a {kind.__name__} holds {value!r:.60}") from None
+    return values
 
 
 def word(kind: type[Any]) -> str:
@@ -548,10 +546,10 @@ def from_json(annotation: Any, value: Any) -> Value:
 
 def _value(kinds: _Kinds, value: Any) -> Value:
     optional, kind, items = kinds
+    if items:
+        return _listed(items, value)
     if value is None and optional:
         return None
-    if kind is list:
-        return _listed(items, value)
     if kind is float and type(value) in (float, int) and math.isfinite(value):
         return float(value)
     if type(value) is not kind or kind is float:
@@ -561,6 +559,6 @@ def _value(kinds: _Kinds, value: Any) -> Value:
 
 def _listed(items: frozenset[type], value: Any) -> Value:
     """Numbers without nan, or texts."""
-    if type(value) is not list or not items.issuperset(map(type, value)) or not all(map(eq, value, value)):
+    if type(value) not in (list, tuple) or not items.issuperset(map(type, value)) or not all(map(eq, value, value)):
         raise ValueError(f"{value!r:.60} is no list of {'texts' if str in items else 'numbers'}")
     return tuple(value) if str in items else tuple(map(float, value))

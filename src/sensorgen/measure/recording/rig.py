@@ -4,12 +4,13 @@ The sensor responds to the force, so that the recording is fitted by
 
 .. math::
    y(t) = \sum_{i=0}^{3} c_i t^i + \sum_{i=1}^{2} b_i \ln(1 + t / \tau_i) + \sum_{i=1}^{3} \sum_{j=0}^{2} c_{ij} F^i x^j
-          + \sum_{i=1}^{4} d_i \int_0^t F(s)\, e^{-(t - s)/T_i} \frac{ds}{T_i}
+          + (\hat F - F) \sum_{i=0}^{2} h_i F^i + \sum_{i=1}^{4} d_i \int_0^t F(s)\, e^{-(t - s)/T_i} \frac{ds}{T_i}
 
 with F and x shifted by the offset, y the principal component of ln Z, creep with time constants of a tenth and a
 hundredth of the run, and relaxation times T from one second to a minute: without them a slow film would count as a late
-clock. A cross-correlation over all offsets gives the start, then a search around it, then Gauss-Newton. The standard
-error is that of the fit, with the number of independent samples.
+clock, and hysteresis without the terms of the largest force of the press so far, :math:`\hat F`. A cross-correlation
+over all offsets gives the start, then a search around it, then Gauss-Newton. The standard error is that of the fit,
+with the number of independent samples.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -132,6 +133,7 @@ def _read(table: CsvTable) -> RigLog:
 _FINE_S = 0.02  # grid of a relaxation
 _MOST_GRID = 1 << 21  # 11.6 h of the fine one
 _NOISELESS = 1e-9  # of the spread: noise below it counts as none
+_ROUNDING = 1e-12  # of ln Z: a smaller spread is no signal
 
 
 def principal_component(impedance_ohm: Complex) -> Real:
@@ -158,7 +160,7 @@ def principal_component(impedance_ohm: Complex) -> Real:
     for parts in ((np.log(np.abs(z)), np.unwrap(np.angle(z))) for z in impedance_ohm.T):  # one by one, to save memory
         for channel in parts:
             noise, spread = float(np.median(np.abs(np.diff(channel)))), float(np.ptp(channel))
-            if spread > 0:
+            if spread > _ROUNDING:
                 channel = channel / (noise if noise > _NOISELESS * spread else spread)
                 channels.append(channel - basis @ np.linalg.lstsq(basis, channel, rcond=None)[0])
     if not channels:
@@ -204,6 +206,9 @@ _LEAST_F = 8.0  # Fisher's F: the best of thousands of offsets reaches this by c
 _SIGNIFICANT = 3.0  # standard errors from which on a skew is one
 _STEPS = 20
 _CREEP = (10.0, 100.0)  # length of the run over time constants of creep
+MAD = 0.6745  # median absolute deviation of noise over its standard deviation
+_CLEAR = 4.0  # standard deviations of the force that are no way back
+_LIFTED = 0.005  # of the largest force: below it the tip does not press
 _RELAXATION_S = (1.0, 2.0, 4.0, 8.0, 32.0)
 _AROUND_S, _FEW = np.linspace(-2.0, 2.0, 41), 4000  # of the search around the best correlation; samples for it
 
@@ -237,9 +242,16 @@ class Offset:
     def words(self) -> str:
         """The offset, for people."""
         if np.isnan(self.offset_error_s):
-            return f"clocks assumed to agree: no response to the force (it explains {self.explained:.1%} of the signal)"
+            why = f"no significant response to the force (it explains {self.explained:.1%} of the signal)"
+            if not self.by_chance:
+                why = f"one computer stamped both, but the force fits best more than {_STAMPED_S:g} s away"
+            return f"clocks assumed to agree: {why}"
         skew = f", skew {self.skew * 1e6:.3g} +- {self.skew_error * 1e6:.2g} ppm" if self.skew else ""
-        return f"rig's clock + {self.offset_s:.4f} +- {self.offset_error_s:.2g} s{skew}"
+        sign = "-" if self.offset_s < 0 else "+"
+        return f"rig's clock {sign} {abs(self.offset_s):.4f} +- {self.offset_error_s:.2g} s{skew}"
+
+
+NO_CLOCKS = Offset(np.nan, np.nan, 0.0, np.nan, np.nan, 0.0, by_chance=True)
 
 
 def estimated(recording: Recording, time: Real, rig: RigLog, within_s: float) -> Offset:
@@ -305,11 +317,17 @@ def _responses(rig: RigLog) -> Callable[[Real], Real]:
     rows, force, _, position = rig.sound()
     where = (position - position.mean()) / max(float(np.ptp(position)), 1e-9)
     slow = [relaxation(rows, force, tau) for tau in _RELAXATION_S]
+    noise = float(np.median(np.abs(np.diff(force, 2)))) / (MAD * 6**0.5) if len(force) > 2 else 0.0
+    pressed = force > max(_LIFTED * force.max(), _CLEAR * noise)
+    apart = np.cumsum(np.diff(pressed, prepend=False)) * 2 * np.ptp(force)  # raises each press above those before
+    peak = np.maximum.accumulate(force + apart) - apart
+    way_back = np.where(pressed, np.maximum(peak - force - _CLEAR * noise, 0), 0)
 
     def responses(at: Real) -> Real:
-        f, x = np.interp(at, rows, force), np.interp(at, rows, where)
+        f, x, back = (np.interp(at, rows, column) for column in (force, where, way_back))
         powers = ((f, f * f, f * f * f), (1.0, x, x * x))  # products: ** takes five times as long
-        return np.column_stack([*(a * b for a, b in product(*powers)), *(term(at) for term in slow)])
+        immediate = (*(a * b for a, b in product(*powers)), back, back * f, back * f * f)
+        return np.column_stack([*immediate, *(term(at) for term in slow)])
 
     return responses
 
@@ -447,20 +465,20 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
     limit_s = min(within_s, _STAMPED_S) if common_clock and rig.stamped else np.inf
     offset = _best(recordings, times, rig, min(within_s, limit_s))
     if offset.by_chance or abs(offset.offset_s) > limit_s:  # its refinement looks beyond
-        if not common_clock:
-            _refuse_apart(times[0], rig, offset)
+        _refuse_apart(times[0], rig, offset, 0.0 if common_clock else 0.5)
         offset = replace(offset, offset_s=0.0, offset_error_s=np.nan, skew=0.0, skew_error=np.nan)
     return tuple(_joined(one, rig, time, offset) for one, time in zip(recordings, times, strict=True))
 
 
-def _refuse_apart(time: Real, rig: RigLog, offset: Offset) -> None:
-    """Refuse clocks whose offset is unknown, unless half of the shorter record lies in the other, as if they agreed."""
+def _refuse_apart(time: Real, rig: RigLog, offset: Offset, share: float) -> None:
+    """Refuse clocks whose offset is unknown, unless that share of the shorter record lies in the other."""
     rows = rig.sound()[0]
     common = min(time[-1], rows[-1]) - max(time[0], rows[0])
-    if not common >= 0.5 * min(np.ptp(time), np.ptp(rows)):
+    if not common > share * min(np.ptp(time), np.ptp(rows)):
         raise BadInput(
-            f"the force explains {offset.explained:.1%} of the readings: too little to find the offset of the "
-            "clocks; expected time stamps, or times of both files that count from the same moment"
+            f"the force explains {offset.explained:.1%} of the readings: too little to find the offset of the clocks, "
+            f"which have {max(common, 0):.4g} s in common (recording from {time[0]:.6g} s, rig's log from "
+            f"{rows[0]:.6g} s); expected time stamps of both, or times that count from the same moment"
         )
 
 

@@ -4,7 +4,8 @@ The instrument samples at even steps. The computer stamps whole blocks as they a
 that stamps step backwards between blocks. The sample index over the sampling rate gives a time that rises; a straight
 line through the first stamps of all blocks gives its real time, with the error of one stamp over the square root of
 their number. Where the stamps leave that line for good by more than two blocks, samples were lost and the time jumps
-with them; where they go back for good, the computer's clock was set, and the time does not jump.
+with them; where they go back for good, the computer's clock was set, and the time does not jump. A time of the
+instrument itself is followed likewise, sample by sample; if it rises everywhere it stays, its long steps marked.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -244,6 +245,8 @@ MAX_SKEW = 1e-3  # of two quartz clocks, with room to spare: more is a wrong rat
 _NEIGHBOURS = 5  # blocks at either side that must agree on a step
 _LATEST_S = 1e11  # since 1970: the year 5000; a larger number is no time
 _SAME_STEP = 1e-3  # relative difference of two steps that count as equal
+_LEAST_BLOCKS, _UNEQUAL = 8, 0.25  # fewer steps of another length, or less even ones, are gaps and not blocks
+_LAGS = (50, 2)  # of the run over the distance of stamps whose slope is the step: jumps need it, and it needs them
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +279,7 @@ def rebuilt(count: int, time_s: Real | None, stamp_s: Real | None) -> Rebuilt:
     count : int
         Number of samples.
     time_s : (count,) array, optional
-        Time by the instrument [s]; replaced by index times median step where it does not rise.
+        Time by the instrument [s]; replaced by even steps, with its gaps, unless it rises everywhere.
     stamp_s : (count,) array, optional
         Stamps by the computer's clock, in seconds since 1970 [s].
 
@@ -286,8 +289,8 @@ def rebuilt(count: int, time_s: Real | None, stamp_s: Real | None) -> Rebuilt:
         Neither gives a sampling rate.
     """
     time_s, stamp_s = (None if t is None else np.where(np.abs(t) < _LATEST_S, t, np.nan) for t in (time_s, stamp_s))
-    even, notes = _even(count, time_s, stamp_s)
     marks = {name: np.zeros(count, bool) for name in ("gap", "reversed stamp", "repeated stamp", "no stamp")}
+    even, notes = _instrument_time(count, time_s, stamp_s, marks["gap"])
     if stamp_s is None:
         return Rebuilt(even, RecordingClock(), marks, notes)
     steps = np.diff(stamp_s)
@@ -295,75 +298,86 @@ def rebuilt(count: int, time_s: Real | None, stamp_s: Real | None) -> Rebuilt:
     marks["no stamp"][:] = ~np.isfinite(stamp_s)
     if marks["no stamp"].all():
         return Rebuilt(even, RecordingClock(), marks, notes)
-    first, first_stamp = _block_starts(stamp_s)
-    set_back = np.zeros(count)
-    for index, jump_s in _jumps(even, first, first_stamp):
-        if jump_s > 0:
-            even[index:] += jump_s
-            marks["gap"][index] = True
-            notes += (f"{jump_s:.3g} s were lost before sample {index + 1}",)
-        else:
-            set_back[index:] += jump_s
-            notes += (f"the computer's clock was set back by {-jump_s:.3g} s at sample {index + 1}",)
-    return Rebuilt(even, _fitted(even[first], first_stamp - set_back[first]), marks, notes)
+    first = _block_starts(stamp_s)
+    lost, set_back, more = _followed(even, first, stamp_s)
+    marks["gap"] |= lost > 0
+    even += np.cumsum(lost)
+    return Rebuilt(even, _fitted(even[first], (stamp_s - set_back)[first]), marks, notes + more)
 
 
-def _even_by_time(count: int, time_s: Real) -> tuple[Real, tuple[str, ...]]:
-    """Even steps for a time that does not rise everywhere, and a note on that."""
-    steps = np.diff(time_s)
-    rising = steps[np.isfinite(steps) & (steps > 0)]
-    if not len(rising):
-        raise BadInput("the time does not rise at any sample; expected seconds that do")
-    step, first = float(np.median(rising)), time_s[np.flatnonzero(np.isfinite(time_s))[0]]
-    note = f"the time does not rise everywhere: taken as even steps of {step:.6g} s"
-    return np.asarray(first + step * np.arange(count)), (note,)
-
-
-def _even(count: int, time_s: Real | None, stamp_s: Real | None) -> tuple[Real, tuple[str, ...]]:
-    """Time of the instrument, or even steps where it does not rise or is missing; and a note on that."""
-    if time_s is not None and np.isfinite(time_s).all() and (np.diff(time_s) > 0).all():
+def _instrument_time(count: int, time_s: Real | None, stamp_s: Real | None, gap: Mask) -> tuple[Real, tuple[str, ...]]:
+    """Time of the instrument, or even steps where it does not rise or is missing, and notes; marks gaps in place."""
+    if time_s is None:
+        if stamp_s is None or (count > 1 and np.count_nonzero(np.isfinite(stamp_s)) < 2):
+            raise BadInput("no sampling times; expected a time, stamps, or a sampling rate")
+        return _even(count, _block_starts(stamp_s), stamp_s), ()
+    first = _block_starts(time_s)
+    even = _even(count, first, time_s)
+    step, steps = even[-1] / max(count - 1, 1), np.diff(time_s)
+    if len(first) and np.isfinite(time_s).all() and (steps > 0).all():
+        least = max(step / 2, _OUTLIER * 1.4826 * float(np.median(np.abs(steps - step)))) if count > 1 else 0.0
+        gap[1:] = (steps - step > least) & (steps <= PAUSE_S)  # a pause begins a part of the recording
         return np.array(time_s, float), ()
+    note = f"the time does not rise everywhere: taken as even steps of {step:.6g} s"
+    lost, set_back, notes = _followed(even, first, time_s)
+    gap |= lost > 0
+    even += np.cumsum(lost)
+    return even + (np.nanmedian(time_s - set_back - even) if len(first) else 0.0), (note, *notes)
+
+
+def _followed(even: Real, first: NDArray[np.intp], stamp_s: Real) -> tuple[Real, Real, tuple[str, ...]]:
+    """Time that was lost before each sample, by how much the clock was set back until it [s]; and notes on both."""
+    jumps = np.zeros(len(even))
+    jumps[first] = _jumps(even[first], stamp_s[first])
+    notes = tuple(
+        f"{jumps[k]:.3g} s were lost before sample {k + 1}" if jumps[k] > 0 else
+        f"the clock was set back by {-jumps[k]:.3g} s at sample {k + 1}"
+        for k in np.flatnonzero(jumps)
+    )  # fmt: skip
+    return np.maximum(jumps, 0), np.cumsum(np.minimum(jumps, 0)), notes
+
+
+def _even(count: int, first: NDArray[np.intp], stamp_s: Real) -> Real:
+    """Even steps, by median slopes: between near blocks, then over half of the run without the time of lost samples."""
     if count == 1:
-        return np.zeros(1), ()
-    if time_s is not None:
-        return _even_by_time(count, time_s)
-    if stamp_s is None or np.count_nonzero(np.isfinite(stamp_s)) < 2:
-        raise BadInput("no sampling times; expected a time, stamps, or a sampling rate")
-    start, stamp = _block_starts(stamp_s)
-    half = max(1, len(start) // 2)
-    far = start[half:] - start[:-half]  # slopes over half of the run, which lost samples change least
-    step = float(np.median((stamp[half:] - stamp[:-half]) / far)) if len(far) else float(np.median(np.diff(stamp_s)))
-    if not step > 0:
-        raise BadInput("the time stamps do not rise; expected seconds that do")
-    return np.asarray(step * np.arange(count)), ()
+        return np.zeros(1)
+    stamps = rising = stamp_s[first]
+    for share in _LAGS:
+        lag = max(1, len(first) // share)
+        slopes = (rising[lag:] - rising[:-lag]) / (first[lag:] - first[:-lag])
+        step = float(np.median(slopes)) if len(slopes) else 0.0
+        if not step > 0:
+            raise BadInput("the time does not rise; expected seconds that do")
+        rising = stamps - np.cumsum(_jumps(np.asarray(step * first), stamps))
+    return np.asarray(step * np.arange(count))
 
 
-def _block_starts(stamp_s: Real) -> tuple[NDArray[np.intp], Real]:
-    """First samples of the blocks and their stamps; a block begins where a step differs from the median step."""
-    finite = np.flatnonzero(np.isfinite(stamp_s))
-    stamps = stamp_s[finite]
-    steps = np.diff(stamps)
+def _block_starts(stamp_s: Real) -> NDArray[np.intp]:
+    """First samples of the blocks: where a step differs from the median step, if blocks are equally long."""
+    finite: NDArray[np.intp] = np.flatnonzero(np.isfinite(stamp_s))
+    steps = np.diff(stamp_s[finite])
     usual = float(np.median(steps)) if len(steps) else 0.0
-    begins = np.concatenate([[True], np.abs(steps - usual) > np.maximum(_SAME_STEP * abs(usual), 1e-6)])
-    if np.count_nonzero(begins) < 2:  # no blocks: every sample has a stamp of its own
-        begins[:] = True
-    return finite[begins], stamps[begins]
+    begins = np.concatenate([[True], np.abs(steps - usual) > max(_SAME_STEP * abs(usual), 1e-6)])[: len(finite)]
+    lengths = np.diff(np.flatnonzero(begins))
+    if usual and (len(lengths) < _LEAST_BLOCKS or np.median(np.abs(lengths / np.median(lengths) - 1)) > _UNEQUAL):
+        return finite  # every sample has a stamp of its own
+    return np.asarray(finite[begins])
 
 
-def _jumps(even: Real, first: NDArray[np.intp], stamp_s: Real) -> list[tuple[int, float]]:
-    """Samples at which the stamps leave the time for good, and by how much [s]."""
-    difference = stamp_s - even[first]
+def _jumps(even: Real, stamp_s: Real) -> Real:
+    """Time by which each stamp leaves the even time for good; 0 at most of them [s]."""
+    jumps, difference = np.zeros(len(even)), stamp_s - even
     steps = np.diff(difference)
     if len(steps) < 2:
-        return []
-    block_s = float(np.median(np.diff(even[first])))
+        return jumps
+    block_s = float(np.median(np.diff(even)))
     least = max(2 * block_s, _OUTLIER * 1.4826 * float(np.median(np.abs(steps - np.median(steps)))))
-    jumps = []
-    for k in np.flatnonzero(np.abs(steps) > least):
-        before, after = difference[max(0, k + 1 - _NEIGHBOURS) : k + 1], difference[k + 1 : k + 1 + _NEIGHBOURS]
-        jump = float(np.median(after) - np.median(before))
-        if abs(jump) > least and len(after) > 1 and jump * steps[k] > 0:
-            jumps.append((int(first[k + 1]), jump))
+    large = np.flatnonzero(np.abs(steps[:-1]) > least) + 1  # not the last: it would have no other that agrees
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(difference, _NEIGHBOURS, mode="edge"), _NEIGHBOURS)
+    jump = np.median(windows[large + _NEIGHBOURS], axis=1) - np.median(windows[large], axis=1)
+    here = steps[large - 1]
+    jump = np.where(np.abs(jump) > np.abs(here) + least, here, jump)  # another one is near
+    jumps[large] = np.where((np.abs(jump) > least) & (jump * here > 0), jump, 0.0)
     return jumps
 
 

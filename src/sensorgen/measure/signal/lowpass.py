@@ -178,5 +178,5 @@ def filtered(recording: Recording, cutoff_hz: float = CUTOFF_HZ) -> tuple[Real, 
         values = column[valid] if even else np.interp(grid, time, column[valid])
         smooth[:, k] = offline(values[:, None], rate, cutoff_hz)[:, 0]
     before = np.clip(np.searchsorted(time, grid, side="right") - 1, 0, len(time) - 2)
-    smooth[(time[before + 1] - time[before]) * cutoff_hz > _LONGEST_GAP] = np.nan
+    smooth[(time[before + 1] - time[before]) * cutoff_hz > _LONGEST_GAP] = complex("nan+nanj")
     return grid, smooth

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.measure.recording.rig import principal_component
+from sensorgen.measure.recording.rig import MAD, principal_component
 
 MOST_PRESSES = 100_000
 _STEP_N, _STEP_MM = 0.001, 0.001  # resolution: the file has all digits
@@ -151,8 +151,8 @@ _SHORTEST_S = 0.2
 _LEAST = 8  # samples that a mean and its error need
 _HYSTERESIS = 0.5
 _STEP_S, _SIGNIFICANT = 0.3, 6.0
+_ROUNDING = 1e-6  # of the signal: a smaller step is none, however quiet the readings are
 _SAME, _SAME_N = 0.05, 0.05  # share, and least difference, up to which two forces are one
-_MAD = 0.6745  # median absolute deviation of noise over its standard deviation
 
 
 class PressTimes(NamedTuple):
@@ -209,15 +209,17 @@ def by_readings(time_s: Real, impedance_ohm: Complex) -> list[PressTimes]:
     if len(time_s) < 2 * _LEAST:
         raise BadInput(f"{len(time_s)} readings; expected at least {2 * _LEAST} to find presses in")
     width = min(max(1, round(_STEP_S / float(np.median(np.diff(time_s))))), len(time_s) // 2)
-    sums = np.concatenate([[0.0], np.cumsum(np.pad(principal_component(impedance_ohm), width, mode="edge"))])
+    signal = principal_component(impedance_ohm)
+    signal -= np.arange(len(signal)) * float(np.median(signal[width:] - signal[:-width])) / width
+    sums = np.concatenate([[0.0], np.cumsum(np.pad(signal, width, mode="edge"))])
     means = (sums[width:] - sums[:-width]) / width  # over so many samples before, and from, each sample
     before, after = means[: len(time_s)], means[width : width + len(time_s)]
     step = after - before
-    limit = _SIGNIFICANT * float(np.median(np.abs(step - np.median(step)))) / _MAD
+    limit = max(_SIGNIFICANT * float(np.median(np.abs(step))) / MAD, _ROUNDING * float(np.ptp(signal)))
     edges = sorted(
         (int(a + np.argmax(sign * step[a:b])), sign) for sign in (1, -1) for a, b in _spans(sign * step > limit)
     )
-    spans = _returning(edges, before, after, width)
+    spans = _returning(edges, before, after, width, limit)
     return [PressTimes(float(time_s[i]), float(time_s[j])) for i, j in spans if time_s[j] - time_s[i] >= _SHORTEST_S]
 
 
@@ -227,7 +229,9 @@ def _spans(on: Mask) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
 
 
-def _returning(edges: list[tuple[int, int]], before: Real, after: Real, width: int) -> list[tuple[int, int]]:
+def _returning(
+    edges: list[tuple[int, int]], before: Real, after: Real, width: int, limit: float
+) -> list[tuple[int, int]]:
     """Presses from steps: of the two ways to pair them, the one whose presses return to the level before."""
     if not edges:
         return []
@@ -240,7 +244,7 @@ def _returning(edges: list[tuple[int, int]], before: Real, after: Real, width: i
 
     first = edges[0][1]
     likely, other = ([(i, j) for (i, a), (j, b) in pairwise(edges) if (a, b) == (s, -s)] for s in (first, -first))
-    return other if difference(other) < difference(likely) / 2 else likely
+    return other if difference(likely) > max(2 * difference(other), limit) else likely
 
 
 @dataclass(frozen=True, eq=False)

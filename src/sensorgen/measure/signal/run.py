@@ -1,12 +1,12 @@
 """Process a recording: join it with the rig, filter it, remove its drift, average its presses; hysteresis of each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording.rig import Joined, RigLog, joined
+from sensorgen.measure.recording.rig import NO_CLOCKS, Joined, RigLog, joined
 from sensorgen.measure.recording.samples import Recording
 from sensorgen.measure.signal import drift, lowpass, presses
 from sensorgen.measure.signal.presses import THRESHOLD_N, by_force
@@ -28,6 +28,8 @@ class Processed:
         Drift removed from the presses' readings; None if none was.
     pairs : Pairs or None
         Readings before and under each press; None where there are none.
+    clock_error_s : float
+        Standard error of the rig's clock; nan if unknown [s].
     by_force : bool
         Whether presses were detected by the rig's force; else by the readings alone, force and position unknown.
     notes : tuple of str
@@ -40,6 +42,7 @@ class Processed:
     filtered_ohm: Complex
     drift: drift.Drift | None
     pairs: presses.Pairs | None
+    clock_error_s: float
     by_force: bool
     notes: tuple[str, ...]
 
@@ -75,7 +78,8 @@ def processed(
     """
     if law:
         drift.check(law)
-    one, force, position, notes = _beside(recording, rig)
+    beside = _beside(recording, rig)
+    one, force, notes = beside.recording, beside.force_n, list(beside.notes)
     valid = one.valid()
     filtered = lowpass.filtered(one, cutoff_hz)
     if rig:
@@ -90,22 +94,20 @@ def processed(
         except BadInput as error:
             notes.append(f"drift not removed: {error}")
     try:
-        pairs = presses.pairs(one.time_s, z, valid, spans, force, position) if spans else None
+        pairs = presses.pairs(one.time_s, z, valid, spans, force, beside.set_position_mm) if spans else None
         notes += map("left out: {}".format, pairs.left_out) if pairs else ["nothing pressed"]
     except BadInput as error:
         notes.append(f"no presses: {error}")
-    return Processed(one, force, *filtered, removed, pairs, rig is not None, tuple(notes))
+    return Processed(one, force, *filtered, removed, pairs, beside.clocks.offset_error_s, rig is not None, tuple(notes))
 
 
-def _beside(recording: Recording, rig: RigLog | Joined | None) -> tuple[Recording, Real, Real, list[str]]:
-    """A recording with force and position, nan without a rig [N], [mm]; and remarks."""
-    notes = list(recording.source.notes)
+def _beside(recording: Recording, rig: RigLog | Joined | None) -> Joined:
+    """A recording with force and position, nan without a rig; notes on both."""
     if rig is None:
         unknown = np.full(len(recording.time_s), np.nan)
-        return recording, unknown, unknown, notes
+        return Joined(recording, unknown, unknown, unknown, NO_CLOCKS, recording.source.notes)
     beside = joined(recording, rig) if isinstance(rig, RigLog) else rig
-    notes += [beside.clocks.words(), *beside.notes]
-    return beside.recording, beside.force_n, beside.set_position_mm, notes
+    return replace(beside, notes=(*recording.source.notes, beside.clocks.words(), *beside.notes))
 
 
 def _drift(one: Recording, spans: list[presses.PressTimes], force_n: Real | None, law: str) -> drift.Drift:
@@ -129,9 +131,10 @@ class Hysteresis:
     Attributes
     ----------
     share : (m,) array
-        Largest difference of unloading and loading over the span of the readings [-].
+        Largest difference of unloading and loading over the span of the readings at these forces [-].
     error : (m,) array
-        Standard error of the difference at one force; the largest of many is a few of it [-].
+        Standard error of the difference at one force; the largest of many is a few of it [-]. With that of the rig's
+        clock, if known, which moves both curves apart, from :func:`of_presses`.
     at_n : (m,) array
         Force of the largest difference [N].
     lost : (m,) array
@@ -234,12 +237,15 @@ def of_presses(worked: Processed, threshold_n: float = THRESHOLD_N) -> Ways:
     time, force = one.time_s[valid], worked.force_n[valid]
     ways: dict[float, Hysteresis] = {}
     left_out = []
+    late_n = np.interp(time + np.nan_to_num(worked.clock_error_s), time, force)
     for press in by_force(time, force, threshold_n):
         during = (time >= press.start_s) & (time <= press.end_s)
         z = one.impedance_ohm[np.flatnonzero(valid)[during]]
         clean = worked.drift.removed(time[during], z) if worked.drift else z
+        values = np.hstack([clean.real, clean.imag])
         try:
-            ways[press.start_s] = hysteresis(force[during], np.hstack([clean.real, clean.imag]))
+            way, late = hysteresis(force[during], values), hysteresis(late_n[during], values)
+            ways[press.start_s] = replace(way, error=np.hypot(way.error, late.share - way.share))
         except BadInput as error:
             left_out.append(f"left out: press at {press.start_s:.6g} s: {error}")
     if not ways:

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from itertools import chain, product
 from math import comb, inf, isnan, nan, pi, prod, sqrt, tanh
 from statistics import median
-from typing import Any
+from typing import Any, NamedTuple
 
 from sensorgen.core.errors import OutOfRange
 
@@ -149,6 +149,7 @@ def _root(falling: Callable[[float], float], value: float) -> float:
 WORDS = ("open electrode", "short", "leak", "dry joint", "intact", "unknown")
 """Verdicts, the gravest first; unknown where a reading is missing."""
 
+_GRAVE = (*WORDS[:4], "unknown", "intact", "sound")
 INTACT_OHM = 1e8  # highest range of a bench multimeter
 REACTANCES = 10.0  # of a film: a leak of so many in parallel changes its impedance by 1/2/10**2, 0.5 %
 ORDER = 10.0  # largest factor of one order of magnitude
@@ -156,8 +157,7 @@ _DRY, _OPEN, _LOW = 3.0, 100.0, 0.1  # of the expected resistance
 _APART = 2.0  # factor between readings of one electrode beyond which the contact is bad
 
 
-@dataclass(frozen=True, slots=True)
-class Evidence:
+class Evidence(NamedTuple):
     """Readings of one specimen.
 
     Attributes
@@ -182,8 +182,7 @@ class Evidence:
     plate: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class SignalVerdict:
+class SignalVerdict(NamedTuple):
     """A verdict with its numbers.
 
     Attributes
@@ -268,13 +267,12 @@ def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> SignalVerdict:
         raise OutOfRange(f"{of.name}: {of.expected_ohm:g} ohm expected of an electrode; expected a number above 0")
     if any(map(isnan, (*of.ry_ohm, *of.rz_ohm))):
         raise OutOfRange(f"{of.name}: readings {of.ry_ohm} and {of.rz_ohm} ohm; expected numbers, or none")
-    ry, rz = (max(min(values, default=nan), 0.0) for values in (of.ry_ohm, of.rz_ohm))  # nan stays nan, being first
+    ry, rz = max(min(of.ry_ohm, default=nan), 0.0), max(min(of.rz_ohm, default=nan), 0.0)  # nan stays, being first
     electrode, why_electrode = _electrode(of, ry)
     film, why_film = _film(ry, rz, of.expected_ohm, intact_ohm)
     known = not isnan(rz) and 0 <= ry < inf
     leak, ratio = leak_s(rz, ry) if known else nan, rz / ry if known and ry else nan
-    grave = [word for word in (*WORDS[:4], "unknown") if word in (electrode, film)]
-    word = next(iter(grave), "intact")
+    word = min(electrode, film, key=_GRAVE.index)
     return SignalVerdict(word, electrode, film, ry, rz, ratio, leak, (why_electrode, why_film), intact_ohm)
 
 
@@ -301,7 +299,7 @@ def _film(ry: float, rz: float, expected_ohm: float, intact_ohm: float) -> tuple
         return "unknown", "no reading between the electrodes"
     if rz >= intact_ohm:
         return "intact", f"R_Z {rz:.4g} ohm is at or above the {intact_ohm:.4g} ohm of an intact film"
-    line = next((r for r in (ry, expected_ohm) if 0 <= r < inf), 0.0)  # an open electrode has no part in a short
+    line = ry if 0 <= ry < inf else expected_ohm if 0 <= expected_ohm < inf else 0.0  # no open electrode's
     if rz <= 2 * line:
         return "short", f"R_Z {rz:.4g} ohm is within the {2 * line:.4g} ohm of two electrodes"
     return (
@@ -316,14 +314,9 @@ def expected_from(readings: Sequence[float]) -> float:
     Parameters
     ----------
     readings : sequence of float
-        Of each, the :func:`least` [ohm].
+        The least of each along its electrode, where that is finite [ohm].
     """
     return median(readings) or nan if readings else nan
-
-
-def least(of: Evidence) -> tuple[float, ...]:
-    """The least reading along an electrode, unless none is finite [ohm]."""
-    return (min(of.ry_ohm),) if of.ry_ohm and min(of.ry_ohm) < inf else ()
 
 
 CONFIDENCE = 0.95

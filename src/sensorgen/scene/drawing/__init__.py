@@ -89,7 +89,7 @@ def along_mm(finding: Finding, panel: ViewPanel) -> float | None:
     if finding.place_mm is None:
         return None
     along = finding.place_mm[AXES.index(panel.view.section.across)]
-    return along if 0 <= along <= panel.view.end_mm else None
+    return along if panel.view.start_mm <= along <= panel.view.end_mm else None
 
 
 def panel_of(finding: Finding, panels: Sequence[ViewPanel]) -> int:
@@ -335,12 +335,12 @@ def svg(
     left, room = SPLIT + 3, RIGHT - SPLIT - 3
     rows = title_rows(scene, details[0].frame, grid, gap[0] if gap else None, notes)
     mark = ""
-    if gap and gap[0].near[0] <= gap[1].view.end_mm:  # in the view that shows it smallest
+    if gap and gap[1].view.start_mm <= gap[0].near[0] <= gap[1].view.end_mm:  # in the view that shows it smallest
         mark, space = panels.gap(gap[1], gap[0])
         taken += space
     parts = [
-        *_sections(scene, details, lanes, grid, materials),
-        *(part for panel in details if printed for part in panels.outlined(panel, printed)),
+        *_sections(details, lanes, grid, materials),
+        *(part for panel in details for part in panels.lettered(panel, letters, materials, printed)),
         mark,
         *on_detail(shown, details, grid, taken),
         *_overview(scene, details, wholes, materials),
@@ -379,11 +379,8 @@ def _overview(
         yield from panels.draw_whole(detail, whole, name, scene, colours)
 
 
-def _sections(
-    scene: Scene, details: Sequence[ViewPanel], lanes: Lanes, grid: Sequence[float], colours: Colours
-) -> Iterator[str]:
-    """The sections with layer grid, dimensions, captions and letters."""
-    letters = panels.letters(scene.bodies)
+def _sections(details: Sequence[ViewPanel], lanes: Lanes, grid: Sequence[float], colours: Colours) -> Iterator[str]:
+    """The sections with layer grid, dimensions and captions."""
     first, right = details[0].frame, details[-1].frame.right
     yield box("bed", first.left - 2, first.bed, right - first.left + 4, 0.9)
     for panel in details:
@@ -399,7 +396,6 @@ def _sections(
         yield from panels.rows(panel.frame, above, over, -panels.ROW)
         yield from panels.rows(panel.frame, below, panel.frame.bed + 5.4, panels.ROW)
         yield panels.broken(panel)
-        yield from panels.lettered(panel, letters, colours)
 
 
 def _page(title: str, parts: Sequence[str]) -> str:

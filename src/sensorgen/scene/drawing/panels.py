@@ -149,8 +149,9 @@ def arrange(views: Sequence[View], grid_mm: float, height_mm: float, room: Room)
         most = min(each / scale, MOST_REPEATS * view.repeat_mm() or each / scale)
         digit = 10.0 ** (floor(log10(most)) - 1)
         end = min(view.extent_mm, round(floor(most / digit + 1e-9) * digit, 12))  # all of it, or a round length
-        frame = ViewFrame(left, bottom, left + end * scale, bottom - grid_mm * scale, scale, scale)
-        panels.append(ViewPanel(replace(view, end_mm=end), frame))
+        seen = view.first(end)
+        frame = ViewFrame(left, bottom, left + end * scale, bottom - grid_mm * scale, scale, scale, seen.start_mm)
+        panels.append(ViewPanel(seen, frame))
         left = max(frame.right + GUTTER, left + CAPTION)
     return panels
 
@@ -216,8 +217,11 @@ def letter_places(panel: ViewPanel) -> dict[str, Point]:
     return {name: (min(max(x, left), right), y) for name, (_, (x, y)) in best.items()}
 
 
-def lettered(panel: ViewPanel, names: Mapping[str, str], colours: Colours) -> Iterator[str]:
-    """The bodies' letters, in ink that shows on their colour."""
+def lettered(
+    panel: ViewPanel, names: Mapping[str, str], colours: Colours, printed: Scene | None
+) -> Iterator[str]:  # fmt: skip
+    """Outlines of the print, and over them the bodies' letters, in ink that shows on their colour."""
+    yield from _outlined(panel, printed.bodies if printed else ())
     materials_of = {body.name: body.material for body, _ in panel.view.regions}
     for name, (x, y) in letter_places(panel).items():
         fill = colour(colours, materials_of[name])
@@ -231,28 +235,29 @@ def caption(panel: ViewPanel, name: str, y: float) -> str:
     view, scale = panel.view, panel.frame.per_mm
     words = (
         f"Section {name}: {view.normal} = {number(view.section.at_mm)} mm, "
-        f"{view.section.across} from 0 to {number(view.end_mm)} mm, {scale_words(scale)}"
+        f"{view.section.across} from {number(view.start_mm)} to {number(view.end_mm)} mm, {scale_words(scale)}"
     )
-    return text("bold", panel.frame.left, y, fitted(words, (CAPTION - 2) / 1.08))
+    room = max(CAPTION - 2, panel.frame.right - panel.frame.left)
+    return text("bold", panel.frame.left, y, fitted(words, room / 1.08))
 
 
 def broken(panel: ViewPanel) -> str:
-    """The break line at the right end, where the sensor goes on."""
-    if panel.view.end_mm >= panel.view.extent_mm:
-        return ""
-    highest = max(z for _, outline in panel.view.regions for _, z in outline)
-    x, top, bottom = panel.frame.right, panel.frame.y(highest), panel.frame.bed
-    middle = (top + bottom) / 2
-    path = f"M{number(x)} {number(top - 2)}V{number(middle - 2)}l-1.6 .6l3.2 2.8l-1.6 .6V{number(bottom + 2)}"
-    return element("path", "under", d=path) + element("path", "thin", d=path)
+    """The break lines at the ends where the sensor goes on."""
+    view, frame = panel.view, panel.frame
+    places = [frame.left] * (view.start_mm > 0) + [frame.right] * (view.end_mm < view.extent_mm)
+    highest = max(z for _, outline in view.regions for _, z in outline)
+    top, middle, bottom = frame.y(highest) - 2, (frame.y(highest) + frame.bed) / 2 - 2, frame.bed + 2
+    zigzag = f"V{number(middle)}l-1.6 .6l3.2 2.8l-1.6 .6V{number(bottom)}"
+    path = "".join(f"M{number(x)} {number(top)}{zigzag}" for x in places)
+    return element("path", "under", d=path) + element("path", "thin", d=path) if path else ""
 
 
-def outlined(panel: ViewPanel, printed: Scene) -> Iterator[str]:
+def _outlined(panel: ViewPanel, bodies: Sequence[Body]) -> Iterator[str]:
     """Outlines of the printed bodies where a view cuts them, one path for each body."""
     view = panel.view
-    for body in printed.bodies:
+    for body in bodies:
         seen = (outline for p in body.pieces for outline in p.cut(view.normal, view.section.at_mm))
-        path = "".join(panel.frame.outline(part) for o in seen if (part := clipped(o, view.end_mm)))
+        path = "".join(panel.frame.outline(part) for o in seen if (part := clipped(o, view.end_mm, view.start_mm)))
         if path:
             yield element("path", "halo-line", "", d=path) + element("path", "printed", "", d=path, data_body=body.name)
 
@@ -265,7 +270,7 @@ def arrange_wholes(
     up = STRIP_HEIGHT / height_mm
     panels = []
     for k, detail in enumerate(details):
-        view = replace(detail.view, end_mm=detail.view.extent_mm)
+        view = replace(detail.view, start_mm=0.0, end_mm=detail.view.extent_mm)
         along = min((each - STRIP_LEFT - STRIP_RIGHT) / view.extent_mm, up)
         start = left + k * each + STRIP_LEFT
         panels.append(
@@ -278,7 +283,8 @@ def draw_whole(detail: ViewPanel, whole: ViewPanel, name: str, scene: Scene, col
     """The strip with its detail window, its length and its height."""
     frame, view = whole.frame, whole.view
     long, ratio = frame.right - frame.left, frame.per_mm_up / frame.per_mm
-    shortened = detail.view.end_mm < view.extent_mm
+    start, window = frame.x(detail.view.start_mm), (detail.view.end_mm - detail.view.start_mm) * frame.per_mm
+    shortened = window < long
     words = [f"Overview {name}: all of {view.section.across}, {number(scene.size_mm[AXES.index(view.normal)])} mm deep"]
     words += [f"period {number(view.repeat_mm())} mm"] if view.period_mm else []
     words.append(f"height × {ratio:.3g}" if ratio > 1.0005 else "true to scale")
@@ -292,7 +298,6 @@ def draw_whole(detail: ViewPanel, whole: ViewPanel, name: str, scene: Scene, col
         yield box("fine", frame.left, frame.top, long, STRIP_HEIGHT)
         yield text("small middle", frame.left + long / 2, frame.top + STRIP_HEIGHT / 2 + 0.8, fine)
     if shortened:
-        window = detail.view.end_mm * frame.per_mm
-        yield box("window", frame.left - 0.4, frame.top - 0.6, window + 0.8, STRIP_HEIGHT + 1.2)
+        yield box("window", start - 0.4, frame.top - 0.6, window + 0.8, STRIP_HEIGHT + 1.2)
     yield from beside(frame, [[Measure(0.0, scene.size_mm[2])]])
     yield from rows(frame, [[Measure(0.0, view.extent_mm)]], frame.bed + 4.6, ROW)

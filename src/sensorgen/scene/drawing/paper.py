@@ -37,6 +37,8 @@ class ViewFrame:
         Where the view ends on the page [mm].
     per_mm, per_mm_up : float
         Paper per sensor, along the section and in height [mm/mm].
+    start_mm : float
+        Length along the section at the left end [mm].
     """
 
     left: float
@@ -45,10 +47,11 @@ class ViewFrame:
     top: float
     per_mm: float
     per_mm_up: float
+    start_mm: float = 0.0
 
     def x(self, along_mm: float) -> float:
         """Place on the page of a length along the section [mm]."""
-        return self.left + along_mm * self.per_mm
+        return self.left + (along_mm - self.start_mm) * self.per_mm
 
     def y(self, height_mm: float) -> float:
         """Place on the page of a height over the bed [mm]."""

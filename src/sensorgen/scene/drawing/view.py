@@ -10,19 +10,21 @@ from itertools import chain, pairwise, permutations
 from math import hypot
 
 from sensorgen.core.lazy import by_key
-from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Point, Scene, area_mm2, clipped, sides
+from sensorgen.scene.scene import AXES, FLOATING, SLIVER_MM, Body, Outline, Point, Scene, area_mm2, clipped, sides
 from sensorgen.scene.sections import Section, SectionColumn, alike, columns, distinct
 
-PLACES = 8  # places tried for a section: two periods of crossed strips change eight times
+PLACES = 8  # tried for a section from the edge on, and amid: two periods of crossed strips change eight times
 PROBE = 64  # corners looked at for a period: enough for two repetitions of any pattern one would draw
 SAME_MM, SAME_DIGITS = 1e-6, 6
+BEFORE = 0.1  # share of a view before the crossing that it begins with
+CHORD_MM = 0.01  # of facets from the curved face that they stand for, as an import has them
 MOST_LEVELS, MOST_COLUMNS, MOST_EXTENTS, MOST_PIECES = 9, 8, 3, 2  # measures of a view
 Region = tuple[Body, Outline]
 
 
 @dataclass(frozen=True)
 class View:
-    """A section, seen from the sensor's corner up to ``end_mm``.
+    """A section, seen from ``start_mm`` up to ``end_mm``, as counted from the sensor's corner.
 
     Attributes
     ----------
@@ -32,14 +34,15 @@ class View:
         How long the sensor is along the section [mm].
     period_mm : tuple of float
         Edges of the columns of one period [mm]; empty where nothing repeats.
-    end_mm : float
-        How much of it is looked at [mm].
+    end_mm, start_mm : float
+        The part of it that is looked at [mm].
     """
 
     section: Section
     extent_mm: float
     period_mm: tuple[float, ...]
     end_mm: float
+    start_mm: float = 0.0
 
     @cached_property
     def regions(self) -> list[Region]:
@@ -47,9 +50,9 @@ class View:
         cut_bodies = []
         for body, outline in self.section.regions:
             along = [u for u, _ in outline]
-            if max(along) <= self.end_mm:
+            if self.start_mm <= min(along) and max(along) <= self.end_mm:
                 cut_bodies.append((body, outline))
-            elif min(along) < self.end_mm and (part := clipped(outline, self.end_mm)):
+            elif min(along) < self.end_mm and (part := clipped(outline, self.end_mm, self.start_mm)):
                 cut_bodies.append((body, part))
         return cut_bodies
 
@@ -67,6 +70,19 @@ class View:
     def normal(self) -> str:
         """Axis square to the section."""
         return "y" if self.section.across == "x" else "x"
+
+    def crossing_mm(self) -> float | None:
+        """Where the first column with two terminals begins [mm]; None where they are nowhere above each other."""
+        two = (c.left_mm for c in self.columns if len({layer.body.terminal for layer in c.layers} - {"", FLOATING}) > 1)
+        return next(two, None)
+
+    def first(self, length_mm: float) -> "View":
+        """So much of it from its corner on; where nothing repeats and no terminals cross there, where they first do."""
+        corner, whole = replace(self, end_mm=length_mm), replace(self, end_mm=self.extent_mm)
+        if self.period_mm or corner.crossing_mm() is not None or (crossing := whole.crossing_mm()) is None:
+            return corner
+        start = max(min(round(crossing - BEFORE * length_mm, 1), self.extent_mm - length_mm), 0.0)
+        return replace(self, start_mm=start, end_mm=start + length_mm)
 
     def repeat_mm(self) -> float:
         """Length of one period, 0 where nothing repeats [mm]."""
@@ -94,7 +110,9 @@ def _view(scene: Scene, across: str) -> View:
     normal = "y" if across == "x" else "x"
     spans = [(p.span(normal), body, p) for body, p in scene.pieces]
     cuts = []
-    for low, high in _stretches(scene, normal)[:PLACES]:
+    every = _stretches(scene, normal)
+    amid = len(every) // 2
+    for low, high in dict.fromkeys((*every[:PLACES], *every[amid : amid + PLACES])):
         at = (low + high) / 2
         cut = ((body, o) for (start, end), body, p in spans if start < at < end for o in p.cut(normal, at))
         cuts.append(Section(across, high - low, at, tuple(cut)))
@@ -190,7 +208,7 @@ def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
     lowest = [_reach(view, u, min) for u in edges]
     above = bool(edges) and min(lowest) > middle
     steps, whole = _columns(view, edges, [_reach(view, u, max) for u in edges] if above else lowest)
-    known = [*steps, *whole, Measure(0.0, view.end_mm)]
+    known = [*steps, *whole, Measure(view.start_mm, view.end_mm)]
     pieces = _new(_flats(view), known, by_value=True)[:MOST_PIECES]
     upper, lower = ([[m] for m in pieces if (m.ends_mm[0] > middle) == is_upper] for is_upper in (True, False))
     if above:
@@ -201,7 +219,7 @@ def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
 def _columns(view: View, edges: Sequence[float], reach: Sequence[float]) -> tuple[list[Measure], list[Measure]]:
     """Widths of the columns, unless there are too many, and of a period, where the view shows all of it."""
     steps = [Measure(a, b, ends) for (a, b), ends in zip(pairwise(edges), pairwise(reach), strict=True)]
-    repeats = view.period_mm and len(edges) == len(view.period_mm)
+    repeats = view.period_mm and edges[-1] == view.period_mm[-1]
     whole = [Measure(edges[0], edges[-1], (reach[0], reach[-1]))] if repeats else []
     return steps if 1 < len(steps) <= MOST_COLUMNS else [], whole
 
@@ -209,7 +227,18 @@ def _columns(view: View, edges: Sequence[float], reach: Sequence[float]) -> tupl
 def _edges(view: View) -> list[float]:
     """Edges of the columns of a period, or of all columns where nothing repeats, as far as the view goes [mm]."""
     columns = [*(column.left_mm for column in view.columns), view.columns[-1].right_mm]
-    return [u for u in view.period_mm or columns if u <= view.end_mm + SAME_MM]
+    first, last, bends = view.start_mm - SAME_MM, view.end_mm + SAME_MM, set(_bends(view))
+    within = [u for u in view.period_mm or columns if first <= u <= last]
+    return [u for u in within if u in (within[0], within[-1]) or any(abs(u - bend) < SAME_MM for bend in bends)]
+
+
+def _bends(view: View) -> Iterator[float]:
+    """Places of corners, but for those between the facets of a curved face [mm]."""
+    for _, outline in view.regions:
+        for before, corner, after in zip(outline[-1:] + outline[:-1], outline, outline[1:] + outline[:1], strict=True):
+            foot = _foot(corner, before, after)
+            if hypot(corner[0] - foot[0], corner[1] - foot[1]) > CHORD_MM:
+                yield corner[0]
 
 
 def _filled(rows: Iterable[list[Measure]]) -> list[list[Measure]]:
@@ -221,7 +250,8 @@ def _flats(view: View) -> list[Measure]:
     """Level edges that the view's ends do not cut, from left to right."""
     edges = (edge for _, outline in view.regions for edge in sides(outline))
     flats = sorted((min(a[0], b[0]), max(a[0], b[0]), a[1]) for a, b in edges if a[1] == b[1])
-    return [Measure(low, high, (z, z)) for low, high, z in flats if low > SAME_MM and high < view.end_mm - SAME_MM]
+    first, last = view.start_mm + SAME_MM, view.end_mm - SAME_MM
+    return [Measure(low, high, (z, z)) for low, high, z in flats if low > first and high < last]
 
 
 def _gaps(outlines: Sequence[Outline], others: Sequence[Outline]) -> Iterator[Gap]:
@@ -254,7 +284,7 @@ def _levels(view: View) -> Iterator[float]:
     for _, outline in view.regions:
         for before, (u, z), after in zip(outline[-1:] + outline[:-1], outline, outline[1:] + outline[:1], strict=True):
             flat = any(z == p[1] and abs(u - p[0]) > SAME_MM for p in (before, after))
-            turns = (before[1] - z) * (after[1] - z) > 0 and SAME_MM < u < view.end_mm - SAME_MM
+            turns = (before[1] - z) * (after[1] - z) > 0 and view.start_mm + SAME_MM < u < view.end_mm - SAME_MM
             if flat or turns:
                 yield z
 

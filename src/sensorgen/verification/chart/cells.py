@@ -17,10 +17,10 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design import design as designs
-from sensorgen.models import capacitance_models, thesis_cells
 from sensorgen.scene.scene import Body, Outline, Prism, Scene, box
-from sensorgen.verification import peers
-from sensorgen.verification.chart.measured import ChartPoint, Level, SceneKind, climb
+from sensorgen.verification.apart import ModelAnswer
+from sensorgen.verification.chart import design, works
+from sensorgen.verification.chart.question import OWN, Level, Question, Series, of_scene
 
 PERMITTIVITY = {"air": 1.0, "wall": 1e-10}
 CORNERS = 24  # of a quarter of a circle
@@ -168,37 +168,26 @@ STANDARD: dict[str, Callable[[], KnownCapacitance]] = {
 }
 
 
-def points(name: str, budget_s: float) -> list[ChartPoint]:
-    """Measure every model that applies to a scene."""
+def question(name: str) -> Question:
+    """Capacitance of a scene per area, by every model that applies to it and by programs of others [F/m2]."""
     standard = STANDARD[name]()
-    area, measured = standard.scene.size_mm[0] * standard.scene.size_mm[1] * M_PER_MM**2, []
-    for model, module in capacitance_models().items():
-        if not module.why_not_applicable(standard.scene):
-            for wanted, bounds, seconds in climb(_widths(module, standard), budget_s):
-                measured.append(point(name, model, bounds.times(1 / area), standard, seconds, wanted=wanted))
-    for model, levels, per in _unbounded(name, standard, area):
-        for level, value, seconds in climb(levels, budget_s):
-            one = Interval(value / per, value / per)
-            measured.append(point(name, model, one, standard, seconds, bounded=False, level=level))
-    return measured
+    scene, eps = standard.scene, standard.permittivity
+    per_m2 = 1 / (scene.size_mm[0] * scene.size_mm[1] * M_PER_MM**2)
+
+    def levels(_: str, module: Any) -> Iterator[Level]:
+        for wanted, bounds in _widths(module, standard):
+            yield f"width {wanted:g}" if wanted else "", partial(_per_area, bounds, per_m2), 0.0
+
+    formulas = list(design.formulas(standard.shape, standard.params, eps, "x60", 1.0))
+    only = Series("thesis_cells", OWN, (), "it has formulas of tri and rect alone")
+    others = () if name in _NO_PEERS else design.programs(scene, eps, per_m2)
+    series = (*design.bounds(scene, levels), *(formulas or (only,)), *others)
+    known, known_to = standard.capacitance_f_per_m2, standard.known_to
+    return of_scene(name, "the capacitance of a cell at rest", series, known, known_to)
 
 
-def why_not_applicable(name: str) -> dict[str, str]:
-    """Why models of capacitance do not apply to a scene."""
-    scene = STANDARD[name]().scene
-    reasons = {model: module.why_not_applicable(scene) for model, module in capacitance_models().items()}
-    only = "it has formulas of tri and rect alone"
-    return {model: why for model, why in reasons.items() if why} | {"thesis_cells": only}
-
-
-def _unbounded(name: str, standard: KnownCapacitance, area_m2: float) -> Iterator[tuple[str, list[Level], float]]:
-    """Formulas of the thesis, then programs of others; their levels, and the area that they give a value for [m2]."""
-    for formula, law in thesis_cells.NAMED.items():
-        if standard.shape in law.shapes:
-            work = partial(law.value_f_per_m2, standard.params, standard.permittivity["x60"])
-            yield f"thesis_cells: {formula.removeprefix('thesis-')}", [("", work)], 1.0
-    for peer in () if name in _NO_PEERS else peers.FIELD:
-        yield peer, peers.applicable(peer, standard.scene, standard.permittivity)[0], area_m2
+def _per_area(bounds: Callable[[], Interval | None], per_m2: float) -> ModelAnswer:
+    return works.bounded(interval, per_m2) if (interval := bounds()) else ModelAnswer(())
 
 
 def _widths(module: Any, standard: KnownCapacitance) -> Iterator[tuple[float | None, Callable[[], Interval | None]]]:
@@ -227,17 +216,3 @@ def _widths(module: Any, standard: KnownCapacitance) -> Iterator[tuple[float | N
             return
         else:
             wanted /= 10
-
-
-def point(
-    scene: str, model: str, bounds: Interval, standard: KnownCapacitance, seconds: float, *,
-    wanted: float | None = None, bounded: bool = True, level: str = "",
-) -> ChartPoint:  # fmt: skip
-    """Answer of a model per area, compared with the reference."""
-    off = [abs(bound / standard.capacitance_f_per_m2 - 1) for bound in (bounds.lower, bounds.upper)]
-    error = max(*off, standard.known_to)
-    words = f"{bounds.lower:.9g} to {bounds.upper:.9g} F/m²" if bounded else f"{bounds.lower:.9g} F/m²"
-    return ChartPoint(scene, model, error, seconds, level + words, bounded, wanted, bounds.lower, bounds.upper)
-
-
-KIND = SceneKind("the capacitance of a cell at rest", STANDARD, points, why_not_applicable)

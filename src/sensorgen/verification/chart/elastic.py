@@ -27,8 +27,8 @@ from sensorgen.models.press3d import BrickCounts
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Body, Prism, Scene, box
 from sensorgen.solvers.contact.cell import ContactCell
-from sensorgen.verification.chart.measured import DIGITS, ChartPoint, Ladder, SceneKind, climbed, relative
 from sensorgen.verification.chart.presses import has_mesher
+from sensorgen.verification.chart.question import DIGITS, Ladder, Question, of_scene, own
 
 _RUBBER = Elastic(6e6, 0.5)
 _STRETCHES = np.array([0.97, 0.9, 0.8])  # along the load, of blocks
@@ -132,15 +132,11 @@ BLOCKS: dict[str, Callable[[], KnownBlock]] = {
 }
 
 
-def _points_of_block(name: str, budget_s: float) -> list[ChartPoint]:
-    """Measure every model of compression on one body."""
+def of_block(name: str) -> Question:
+    """Displacement of the top of a body at every load, by every model of compression [m]."""
     standard = BLOCKS[name]()
-    return list(climbed(name, _models(standard), relative(standard.down_m, standard.known_to), budget_s))
-
-
-def _not_for_block(name: str) -> dict[str, str]:
-    """Why models of compression do not apply to a block."""
-    return _refused(BLOCKS[name]())
+    series, asked = own(_models(standard), _refused(standard)), "displacement of the top of a body"
+    return of_scene(name, asked, series, standard.down_m, standard.known_to)
 
 
 def _refused(standard: KnownBlock) -> dict[str, str]:
@@ -170,9 +166,9 @@ def _models(standard: KnownBlock) -> Iterator[Ladder]:
         }
         yield "springs", [("", lambda: springs.displacement_m(standard.scene, moduli, list(standard.stress_pa)))]
     if "press2d" not in refused:
-        yield "press2d", [(f"mesh {k}, ", partial(_flat, standard, m)) for k, m in enumerate(_MESHES, 1)]
+        yield "press2d", [(f"mesh {k}", partial(_flat, standard, m)) for k, m in enumerate(_MESHES, 1)]
     if "press3d" not in refused:
-        yield "press3d", [(f"{n} pieces, ", partial(_deep, standard, n)) for n in _PIECES]
+        yield "press3d", [(f"{n} pieces", partial(_deep, standard, n)) for n in _PIECES]
 
 
 def _by_law(standard: KnownBlock, law: Plate) -> Real:
@@ -200,16 +196,16 @@ _PLANE_PA = 6e6 / (1 - 0.3**2)
 _SIDES_MM = (8e-3, 4e-3, 2e-3)  # where it touches
 
 SPHERE = "sphere on a flat"
-_ROUND = dict.fromkeys(("cylinder on a flat", SPHERE), 2 * _CONTACT_MM * M_PER_MM)  # length of the contact [m]
+ROUND = dict.fromkeys(("cylinder on a flat", SPHERE), 2 * _CONTACT_MM * M_PER_MM)  # length of the contact [m]
 
 
-def _points_of_round(name: str, budget_s: float) -> list[ChartPoint]:
-    """Measure every model of a contact."""
+def of_round(name: str) -> Question:
+    """Length of a contact, by every model of it [m]."""
     solve = _turned if name == SPHERE else _solved
-    levels = [(f"sides of {1e3 * side:g} µm, ", partial(solve, side)) for side in _SIDES_MM if has_mesher()]
+    levels = [(f"sides of {1e3 * side:g} µm", partial(solve, side)) for side in _SIDES_MM if has_mesher()]
     formula: Ladder = ("pressure: hertz", [("", _formula)])
     ladders = [("press_round", levels)] if name == SPHERE else [formula, ("press2d", levels)]
-    return list(climbed(name, ladders, relative(_ROUND[name], DIGITS, "off by {:+.3g}"), budget_s))
+    return of_scene(name, "how wide a round body touches", own(ladders, _not_for_round(name)), ROUND[name], DIGITS)
 
 
 def _not_for_round(name: str) -> dict[str, str]:
@@ -290,22 +286,18 @@ def _cylinder(side_mm: float) -> ContactCell:
     return press2d.cell(Scene(bodies, (2 * middle, _DEEP_MM, top)), 2 * middle)
 
 
-_MEMBRANE: dict[str, float] = {"Cook's membrane": 0.077181}
+MEMBRANE: dict[str, float] = {"Cook's membrane": 0.077181}
 _MEMBRANE_KNOWN_TO = 4e-5
 _CELLS = (4, 8, 16, 32)
 _MODULUS, _RATIO = 240.565, 0.4999
 
 
-def _points_of_membrane(name: str, budget_s: float) -> list[ChartPoint]:
-    """Measure the elements of press2d on meshes from coarse to fine."""
-    levels = [(f"{n} x {n} cells of two triangles, ", partial(edge, n)) for n in _CELLS]
-    judge = relative(_MEMBRANE[name], _MEMBRANE_KNOWN_TO, "off by {:+.3g}")
-    return list(climbed(name, [("press2d: its elements", levels)], judge, budget_s))
-
-
-def _not_for_membrane(_: str) -> dict[str, str]:
-    """Why models of compression do not apply to the membrane."""
-    return {"press3d": "its bricks have upright walls", "springs": "nothing presses it", "compression": "it is no film"}
+def of_membrane(name: str) -> Question:
+    """Mean way of the sheared edge, by the elements of press2d on meshes from coarse to fine [mm]."""
+    levels = [(f"{n} x {n} cells of two triangles", partial(edge, n)) for n in _CELLS]
+    why = {"press3d": "its bricks have upright walls", "springs": "nothing presses it", "compression": "it is no film"}
+    series, asked = own([("press2d: its elements", levels)], why), "how far the sheared edge of a membrane moves"
+    return of_scene(name, asked, series, MEMBRANE[name], _MEMBRANE_KNOWN_TO)
 
 
 def edge(cells: int) -> float:
@@ -340,8 +332,3 @@ def _grid(cells: int) -> tuple[Real, Whole, Whole]:
     a, b, c, d = (v.ravel() for v in (k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1]))
     corners = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
     return np.column_stack([48 * x, 44 * x + y * (44 - 28 * x)]), corners, np.ones(len(corners), np.int64)
-
-
-BLOCK = SceneKind("displacement of the top of a body", BLOCKS, _points_of_block, _not_for_block)
-ROUND = SceneKind("how wide a round body touches", _ROUND, _points_of_round, _not_for_round)
-MEMBRANE = SceneKind("how far the sheared edge of a membrane moves", _MEMBRANE, _points_of_membrane, _not_for_membrane)

@@ -6,7 +6,6 @@ a thousandth of abs(Z) at low tones, and is lost first. That of the inversion is
 it, and position, as a share of the sensor's length.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -19,7 +18,8 @@ from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.inverse.estimator import Estimator
 from sensorgen.solvers.line.inputs import PressedLine
 from sensorgen.verification import line_models, peers
-from sensorgen.verification.chart.measured import DIGITS, ChartPoint, Level, SceneKind, climbed
+from sensorgen.verification.chart import design
+from sensorgen.verification.chart.question import DIGITS, OWN, Question, Series, Values, of_line, of_scene, own
 
 # The plate of Table 3.1, pressed in its middle.
 PLATE = {
@@ -90,34 +90,21 @@ STANDARD = {
 _PIECES = (1, 4, 16, 64, 256)  # of a tip
 
 
-def points(name: str, budget_s: float) -> list[ChartPoint]:
-    """Measure every model of the line."""
-    standard = STANDARD[name]
-    known = np.array(list(standard.known.values()))
-
-    def judge(impedance: Any) -> tuple[float, str]:
-        whole, real = line_models.differences(impedance, known)
-        return max(whole, real, DIGITS), f"abs(Z) off by {whole:.2g}, Re Z by {real:.2g}"
-
-    levels: dict[str, list[dict[str, Any]]] = dict(line_models.LEVELS)
-    absent = [program for program in line_models.PROGRAMS if standard.profile != "uniform" or peers.missing(program)]
+def question(name: str) -> Question:
+    """Impedance of a pressed line, by every model of it and by programs of others [ohm]."""
+    standard, pressure = STANDARD[name], "a flat tip presses evenly"
+    levels: dict[str, Any] = dict(line_models.LEVELS)
+    refused = {program: why for program in line_models.PROGRAMS if (why := peers.missing(program))}
     if standard.profile != "uniform":
         levels["line_tip"] = [{"pieces": n, "profile": standard.profile} for n in _PIECES]
-    ladders = [(model, [_level(model, standard, how) for how in hows])
-               for model, hows in levels.items() if model not in absent]  # fmt: skip
-    return list(climbed(name, ladders, judge, budget_s))
-
-
-def _level(model: str, standard: KnownPlatePress, fineness: Mapping[str, Any]) -> Level:
-    words = line_models.words(fineness)
-    return f"{words}, " * bool(words), lambda: line_models.impedance(model, standard.line(), **fineness)
-
-
-def why_not_applicable(name: str) -> dict[str, str]:
-    """Why models of lines do not apply to a scene."""
-    if STANDARD[name].profile == "uniform":
-        return {"pressure": "a flat tip presses evenly"}
-    return {"pressure": "it cuts the tip into the pieces of line_tip"}
+        refused = dict.fromkeys(line_models.PROGRAMS, "its tip is flat")
+        pressure = "it cuts the tip into the pieces of line_tip"
+    series = (
+        Series("pressure", OWN, (), pressure),
+        *design.lines(standard.line(), levels, lambda model: refused.get(model, "")),
+    )
+    known = list(standard.known.values())
+    return of_scene(name, "the impedance of a pressed line", series, known, DIGITS, of_line)
 
 
 _LINE = STANDARD["line, seven tones"]
@@ -125,29 +112,23 @@ _TONES = np.array(list(_LINE.known))
 _READING = np.array(list(_LINE.known.values()))
 _LENGTH_M, _TIP_M = PLATE["length_m"], PLATE["tip_m"]
 
-_LOADS = {"inversion of a load": (_LINE.force_n, PLATE["left_m"] + _TIP_M / 2)}  # [N], centre [m]
-
-Press = tuple[float, float]
+INVERSION = {"inversion of a load": (_LINE.force_n, PLATE["left_m"] + _TIP_M / 2)}  # [N], centre [m]
 
 
-def _inversions(name: str, budget_s: float) -> list[ChartPoint]:
-    """Measure the inversion; what is prepared once for a sensor is not in its time."""
-    force, position = _LOADS[name]
+def inversion(name: str) -> Question:
+    """Force and position of a press [N], [m]; what is prepared once for a sensor is not in its time."""
 
-    def judge(press: Press) -> tuple[float, str]:
-        off = abs(press[0] / force - 1), abs(press[1] - position) / _LENGTH_M
-        return max(*off, DIGITS), f"{press[0]:.6g} N at {1e3 * press[1]:.6g} mm"
-
-    def sought() -> Press:
+    def sought() -> list[float]:
         inverted = _estimator().batch(_READING[None])
-        return float(inverted.force_n[0]), float(inverted.position_m[0])
+        return [float(inverted.force_n[0]), float(inverted.position_m[0])]
 
-    return list(climbed(name, [("invert: seven tones", [("", sought)])], judge, budget_s))
+    series = own([("invert: seven tones", [("", sought)])], {})
+    return of_scene(name, "force and position from an impedance", series, INVERSION[name], DIGITS, _of_press)
 
 
-def _only_inversion(_: str) -> dict[str, str]:
-    """No reasons: models of the line are not asked, only what turns around is."""
-    return {}
+def _of_press(answer: Values, known: Values) -> float:
+    """Larger one of force, as a share of it, and position, as a share of the sensor's length [-]."""
+    return max(abs(answer[0] / known[0] - 1), abs(answer[1] - known[1]) / _LENGTH_M)
 
 
 @cache
@@ -157,7 +138,3 @@ def _estimator() -> Estimator:
     high, rho = ((p[f"top_{of}"], p[f"bottom_{of}"]) for of in ("thickness_m", "resistivity_ohm_m"))
     law = compression.unconfined(p["modulus_pa"])
     return Estimator(Sensor(_LENGTH_M, p["width_m"], high, rho, film, law, _TIP_M), _TONES)
-
-
-LINE = SceneKind("the impedance of a pressed line", STANDARD, points, why_not_applicable)
-INVERSION = SceneKind("force and position from an impedance", _LOADS, _inversions, _only_inversion)

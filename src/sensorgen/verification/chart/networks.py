@@ -20,8 +20,7 @@ from sensorgen.models import conduction, line, sheet, stack, traxels
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.network import StraightLines
 from sensorgen.solvers.sheet.parts import Sheet
-from sensorgen.verification import line_models
-from sensorgen.verification.chart.measured import DIGITS, ChartPoint, Level, SceneKind, climbed
+from sensorgen.verification.chart.question import DIGITS, Question, Step, of_line, of_scene, own
 
 Values = NDArray[Any]
 
@@ -42,7 +41,7 @@ class KnownNetwork:
 
     known: Values
     known_to: float
-    models: dict[str, list[Level]]
+    models: dict[str, list[Step]]
 
 
 _TRACKS, _FILMS = (23e3, 67e3, 23e3), (7e-10, 3.5e-10)  # [ohm/m], [F/m]
@@ -83,7 +82,7 @@ def front_edge() -> KnownNetwork:
         z = sheet.impedance(_SHEET, port, 0.0, cells=cells)[0, 0, 0]
         return np.array([z.real / _SHEET.sheet_resistance_ohm[0]])
 
-    levels: list[Level] = [(f"{n} cells, ", partial(between, n)) for n in _GRIDS]
+    levels: list[Step] = [(f"{n} cells", partial(between, n)) for n in _GRIDS]
     return KnownNetwork(np.array([_SQUARES]), 1e-15, {"sheet": levels})
 
 
@@ -92,7 +91,7 @@ def stepped() -> KnownNetwork:
     k = _THIN_MM / _THICK_MM
     step = ((k * k + 1) / k * log((1 + k) / (1 - k)) - 2 * log(4 * k / (1 - k * k))) / pi
     known = _STEPS * (_STEP_MM * (1 / _THIN_MM + 1 / _THICK_MM) / 2 + step)
-    works: list[Level] = [(f"width {width:g} asked, ", partial(_comb, width)) for width in _WIDTHS]
+    works: list[Step] = [(f"width {width:g} asked", partial(_comb, width)) for width in _WIDTHS]
     return KnownNetwork(np.array([known]), DIGITS, {"conduction": works})
 
 
@@ -124,21 +123,12 @@ STANDARD: dict[str, Callable[[], KnownNetwork]] = {
 }
 
 
-def points(name: str, budget_s: float) -> list[ChartPoint]:
-    """Measure every model of a network."""
+def question(name: str) -> Question:
+    """Impedances of a network [ohm], or resistances over those of a solid [-], by its models."""
     standard = STANDARD[name]()
-
-    def judge(values: Values) -> tuple[float, str]:
-        off = max(line_models.differences(values, standard.known))
-        return max(off, standard.known_to), f"off by {off:.3g} at most"
-
-    return list(climbed(name, standard.models.items(), judge, budget_s))
-
-
-def why_not_applicable(_: str) -> dict[str, str]:
-    """Why models of networks do not apply to a scene."""
-    other = "this network is of another kind"
-    return {"stack": other, "sheet": other, "conduction": other, "traxels": other, "line": other}
+    reasons = dict.fromkeys(("stack", "sheet", "conduction", "traxels", "line"), "this network is of another kind")
+    series, asked = own(standard.models.items(), reasons), "what a network of tracks, sheets or lines conducts"
+    return of_scene(name, asked, series, standard.known, standard.known_to, of_line)
 
 
 def _sections() -> tuple[list[list[float]], Values]:
@@ -239,6 +229,3 @@ def _paths(size: NDArray[np.float64], line: float, degrees: float, walls: int) -
         path += [first, last]
     if path:
         yield path
-
-
-KIND = SceneKind("what a network of tracks, sheets or lines conducts", STANDARD, points, why_not_applicable)

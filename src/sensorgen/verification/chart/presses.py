@@ -18,7 +18,7 @@ from sensorgen.models import compression, fem2d, press2d, press3d, springs, thes
 from sensorgen.models.press2d import Elastic, Fineness
 from sensorgen.scene.scene import Fill, Scene
 from sensorgen.solvers.contact import mesher
-from sensorgen.verification.chart.measured import ChartPoint, Ladder, Level, SceneKind, climbed, relative
+from sensorgen.verification.chart.question import Ladder, Question, Step, of_scene, own
 
 _EPS = {"x60": 4.68, "air": 1.00059}
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
@@ -79,22 +79,17 @@ _DOWN, _RISE = "top down", "rise of C"
 STANDARD = {f"tri pressed, {film}: {what}": (film, what) for what in (_DOWN, _RISE) for film in CELLS}
 
 
-def points(name: str, budget_s: float) -> list[ChartPoint]:
-    """Measure every model of compression on one cell."""
+def question(name: str) -> Question:
+    """Way of the top [um], or rise of the capacitance [pF/m], at every load."""
     film, what = STANDARD[name]
-    known = CELLS[film]
-    expected = known.down_um if what == _DOWN else known.rise_pf_per_m
-    judge = relative(expected, known.known_to[what != _DOWN], "off by {:+.2%} at most")
-    return list(climbed(name, _down(known) if what == _DOWN else _rise(known), judge, budget_s))
-
-
-def why_not_applicable(name: str) -> dict[str, str]:
-    """Why models of compression do not apply to a scene."""
-    film, what = STANDARD[name]
-    reasons = {"press3d": press3d.why_not_applicable(_scene(CELLS[film])) or "", "press2d": _MISSING}
-    if what == _DOWN:
-        return reasons | {"thesis_cells": "the displacement is what 3.1.2 is given"}
-    return reasons | {"springs": "it has a displacement and no capacitance"}
+    known, rise = CELLS[film], what == _RISE
+    reasons = {"press2d": _MISSING, "press3d": press3d.why_not_applicable(_scene(known)) or ""}
+    reasons |= (
+        {"springs": "it has a displacement and no capacitance"} if rise
+        else {"thesis_cells": "the displacement is what 3.1.2 is given"}
+    )  # fmt: skip
+    ladders, values = (_rise(known), known.rise_pf_per_m) if rise else (_down(known), known.down_um)
+    return of_scene(name, "compression of a cell", own(ladders, reasons), values, known.known_to[rise])
 
 
 def _down(known: KnownCell) -> Iterator[Ladder]:
@@ -112,7 +107,7 @@ def _rise(known: KnownCell) -> Iterator[Ladder]:
         yield f"compression: {law.name}", [("", partial(_by_law, known, law, rise=True))]
     by_hand = {"formula 3.35": lambda q: thesis_cells.triangles_f_per_m2(q, _EPS["x60"]), "field": _field_f_per_m2}
     for name, work in by_hand.items():
-        yield f"thesis_cells: 3.1.2, {name}", [("displacement given, ", partial(_swept, known, work))]
+        yield f"thesis_cells: 3.1.2, {name}", [("displacement given", partial(_swept, known, work))]
     yield "press2d", _levels(known, _EPS)
 
 
@@ -140,10 +135,10 @@ def has_mesher() -> bool:
     return True
 
 
-def _levels(known: KnownCell, permittivity: dict[str, float] | None) -> list[Level]:
+def _levels(known: KnownCell, permittivity: dict[str, float] | None) -> list[Step]:
     """Finite elements from coarse to fine."""
     return [
-        (f"triangles of {1e3 * mesh.apex_mm:g} µm at the apex, ", partial(_pressed, known, permittivity, mesh))
+        (f"triangles of {1e3 * mesh.apex_mm:g} µm at the apex", partial(_pressed, known, permittivity, mesh))
         for mesh in _MESHES if has_mesher()
     ]  # fmt: skip
 
@@ -172,6 +167,3 @@ def _swept(known: KnownCell, work: Callable[[tri.Params], float]) -> Real:
 def _field_f_per_m2(p: tri.Params) -> float:
     scene = tri.scene(tri.Params(**{**vars(p), "length_mm": p.period_mm, "width_mm": 1.0}), Fill())
     return fem2d.capacitance(scene, _EPS, 1e-4).middle() / (p.period_mm * M_PER_MM**2)
-
-
-KIND = SceneKind("compression of a cell", STANDARD, points, why_not_applicable)

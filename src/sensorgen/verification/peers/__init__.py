@@ -9,14 +9,19 @@ from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 
+from sensorgen.core.bounds import Interval
 from sensorgen.scene.scene import Scene
 
-Levels = list[tuple[str, Callable[[], float]]]  # words, and work that gives a capacitance [F]
+Levels = list[tuple[str, Callable[[], float | Interval]]]  # words, and work that gives a capacitance or bounds [F]
 
 FIELD = {"scikit-fem": "skfem", "NGSolve": "ngsolve", "FastCap": "fastcap2"}
+ALL = (*FIELD, "scikit-rf", "ngspice")
 _FILES = {"scikit-fem": "scikit_fem", "NGSolve": "ngsolve_fem", "FastCap": "fastcap"}
-_UNKNOWNS = (200, 1000, 5000, 20_000)
-_BRICKS: dict[str, tuple[tuple[int, ...], ...]] = {  # layers; and order, where it can be chosen
+# Layers towards corners or edges; and order, where it can be chosen
+_TRIANGLES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "scikit-fem": ((2,), (5,), (10,), (20,)), "NGSolve": ((2, 3), (4, 5), (6, 8), (10, 10), (14, 14)),
+}  # fmt: skip
+_BRICKS: dict[str, tuple[tuple[int, ...], ...]] = {
     "scikit-fem": ((0,), (1,), (2,)), "NGSolve": ((0, 2), (0, 4), (1, 3), (1, 5), (2, 6)),
 }  # fmt: skip
 SLOW_TO_CONVERGE = ("FastCap",)  # off by more than its last step: no reference
@@ -68,9 +73,10 @@ def levels(peer: str, scene: Scene, permittivity: Mapping[str, float]) -> Levels
     if peer == "FastCap":
         cells.share(geometry)  # refuses a cell that is cut
         work, words = module.capacitance, [(f"{n} panels along the height, ", (n,)) for n in _PANELS]
-    elif isinstance(geometry, cells.PlaneSection):
-        work, words = module.plane, [(f"{n} unknowns, ", (n,)) for n in _UNKNOWNS]
     else:
-        of_order = ((how, "".join(f" of order {p}" for p in how[1:])) for how in _BRICKS[peer])
-        work, words = module.boxes, [(f"{how[0]} layers{order}, ", how) for how, order in of_order]
+        flat = isinstance(geometry, cells.PlaneSection)
+        of_order = (
+            (how, "".join(f" of order {p}" for p in how[1:])) for how in (_TRIANGLES if flat else _BRICKS)[peer]
+        )
+        work, words = module.plane if flat else module.boxes, [(f"{how[0]} layers{o}, ", how) for how, o in of_order]
     return [(level, partial(work, geometry, permittivity, *how)) for level, how in words]

@@ -16,7 +16,8 @@ from sensorgen.solvers.electrostatics.boxes import Grid, grid
 
 Vertex = tuple[float, float]
 Edge = tuple[Vertex, Vertex]
-ENDS = ("bottom", "top")
+ENDS, MIRRORS = ("bottom", "top"), ("left", "right")
+_STRAIGHT = 1e-12  # 1 less the cosine of an angle that is none
 RATIO = 0.15  # of a layer's distance from an edge to the next one's
 
 
@@ -48,14 +49,36 @@ class PlaneSection:
     faces: dict[Edge, tuple[str, str]]
     depth_mm: float
 
-    def electrode_edges(self) -> dict[Edge, str]:
-        """Edges of dielectrics on an electrode, and which one."""
-        by_edge = {}
-        for edge, sides in self.faces.items():
+    def _number(self) -> dict[Vertex, int]:
+        return {(u, v): k for k, (u, v) in enumerate(self.points_mm.tolist())}
+
+    def border(self) -> dict[str, list[tuple[int, int]]]:
+        """Edges of the triangles, by the points' numbers, on each electrode and on each mirror: "left" and "right"."""
+        number, first = self._number(), self.points_mm[:, 0].min()
+        edges: dict[str, list[tuple[int, int]]] = {name: [] for name in (*ENDS, *MIRRORS)}
+        for (a, b), sides in self.faces.items():
             ends = [s for s in sides if s in ENDS]
-            if len(ends) == 1 and all(sides):
-                by_edge[edge] = ends[0]
-        return by_edge
+            if a in number and b in number and len(ends) + sides.count("") == 1:
+                name = ends[0] if ends else MIRRORS[int(max(a[0], b[0]) - first > ROUNDING_MM)]
+                edges[name].append((number[a], number[b]))
+        return edges
+
+    def corners(self) -> list[int]:
+        """Numbers of the points at which materials, electrodes and mirrors meet other than in a straight line."""
+        number = self._number()
+        around: dict[Vertex, list[tuple[frozenset[str], float]]] = defaultdict(list)
+        for (a, b), sides in self.faces.items():
+            if sides[0] != sides[1]:
+                angle = float(np.arctan2(b[1] - a[1], b[0] - a[0]))
+                around[a].append((frozenset(sides), angle))
+                around[b].append((frozenset(sides), angle + np.pi))
+        return [number[p] for p, lines in around.items() if p in number and not _is_straight(lines)]
+
+
+def _is_straight(lines: list[tuple[frozenset[str], float]]) -> bool:
+    """Test whether the lines at a point are one straight line between the same two sides."""
+    (one, at), *others = lines
+    return [side for side, _ in others] == [one] and abs(np.cos(at - others[0][1]) + 1) < _STRAIGHT
 
 
 def geometry(scene: Scene) -> PlaneSection | Grid:
@@ -82,7 +105,7 @@ def _plane(section: Section, height_mm: float) -> PlaneSection:
     triangles, materials, shares = [], [], []
     faces: dict[Edge, tuple[str, str]] = {}
     for part, often in zip(piece.slices, piece.shares, strict=True):
-        for name, outline in _polygons(part, heights):
+        for name, outline in _between(list(_polygons(part, heights))):
             middle = (sum(u for u, _ in outline) / len(outline), sum(v for _, v in outline) / len(outline))
             for a, b in pairwise([*outline, outline[0]]):
                 edge = (a, b) if a < b else (b, a)
@@ -95,6 +118,13 @@ def _plane(section: Section, height_mm: float) -> PlaneSection:
     return PlaneSection(
         np.array(list(points)), np.array(triangles), tuple(materials), np.array(shares), faces, section.depth_mm
     )
+
+
+def _between(column: list[tuple[str, list[Vertex]]]) -> list[tuple[str, list[Vertex]]]:
+    """Bands of a column, from the bottom up, without covers under the bottom electrode and on the top one."""
+    low = [k for k, (name, _) in enumerate(column) if name == "bottom"]
+    high = [k for k, (name, _) in enumerate(column) if name == "top"]
+    return column[min(low, default=0) : max(high, default=len(column)) + 1]
 
 
 def _heights(slices: Iterable[Slice]) -> dict[float, set[float]]:

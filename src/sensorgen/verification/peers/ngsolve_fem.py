@@ -1,4 +1,4 @@
-"""Capacitance by NGSolve: triangles refined by Zienkiewicz and Zhu's estimate, or bricks; elements of high order.
+"""Capacitance by NGSolve: triangles or bricks that shrink towards corners; elements of high order, condensed.
 
 Run it in a process that does not load the CAD kernel.
 """
@@ -8,60 +8,71 @@ from typing import Any
 
 import numpy as np
 
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.solvers.electrostatics.boxes import Grid
 from sensorgen.verification.peers import cells
 
-_ORDER = 3  # on triangles
-_WORST = 0.25  # of the largest error: triangles with more are refined
+_NONE = 1e-3  # share of the upper bound that is no lower one [-]
+_ROUNDING = 1e-11  # of an energy, by its solution in double precision [-]
 _BRICK = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
 _SIDES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (2, 3, 7, 6), (1, 2, 6, 5), (3, 0, 4, 7))  # of a brick
 
 
-def plane(section: cells.PlaneSection, permittivity: Mapping[str, float], unknowns: int) -> float:
-    """From above [F]: triangles are refined until there are that many unknowns."""
+def plane(
+    section: cells.PlaneSection, permittivity: Mapping[str, float], rings: int, order: int
+) -> Interval | float:  # fmt: skip
+    r"""Bounds [F], or the upper one alone, by elements of an order that shrink towards each corner in rings.
+
+    .. math:: 1 / \min_\psi \int |\nabla\psi|^2 / \varepsilon \le C \le \min_u \int \varepsilon |\nabla u|^2
+
+    with the stream function 0 at the left mirror and 1 at the right one.
+
+    Raises
+    ------
+    OutOfRange
+        Triangles are too slender for doubles.
+    """
     import netgen.meshing as netgen
     import ngsolve as ng
 
-    values = cells.permittivities(section, permittivity)
-    kinds, which = np.unique(values, return_inverse=True)
+    kinds, which = np.unique(cells.permittivities(section, permittivity), return_inverse=True)
     netgen_mesh = netgen.Mesh(2)
     netgen_mesh.AddPoints(np.column_stack([section.points_mm, np.zeros(len(section.points_mm))]))
     for k in range(len(kinds)):
         netgen_mesh.Add(netgen.FaceDescriptor(surfnr=k + 1, domin=k + 1, domout=0, bc=k + 1))
         netgen_mesh.AddElements(dim=2, index=k + 1, data=section.triangles[which == k].astype(np.int32), base=0)
         netgen_mesh.SetMaterial(k + 1, f"m{k}")
-    number = {tuple(p): k for k, p in enumerate(section.points_mm.tolist())}
-    for k, end in enumerate(cells.ENDS):
-        edges = [[number[a], number[b]] for (a, b), name in section.electrode_edges().items() if name == end]
+    for k, (name, edges) in enumerate(section.border().items()):
         netgen_mesh.AddElements(dim=1, index=k + 1, data=np.array(edges, np.int32), base=0)
-        netgen_mesh.SetBCName(k, end)
+        netgen_mesh.SetBCName(k, name)
+    for corner in section.corners():
+        netgen_mesh.AddSingularity(netgen.PointId(corner + 1), 1.0)
     mesh = ng.Mesh(netgen_mesh)
-    eps = ng.CoefficientFunction(kinds.tolist())
-    while True:
-        energy, field, count = _solved(ng, mesh, eps, _ORDER)
-        if count >= unknowns:
-            return energy * EPS0_F_PER_M * M_PER_MM * section.depth_mm
-        smooth = ng.GridFunction(ng.HDiv(mesh, order=_ORDER - 1))
-        smooth.Set(eps * ng.grad(field))
-        off = eps * ng.grad(field) - smooth
-        error = ng.Integrate(off * off / eps, mesh, ng.VOL, element_wise=True).NumPy()
-        mesh.ngmesh.Elements2D().NumPy()["refine"] = (error > _WORST * error.max())[: mesh.ne]
-        mesh.Refine()
+    mesh.RefineHP(rings, cells.RATIO)
+    eps, unit = ng.CoefficientFunction(kinds.tolist()), EPS0_F_PER_M * M_PER_MM * section.depth_mm
+    try:
+        upper, lower = _energy(ng, mesh, eps, order, cells.ENDS), 1 / _energy(ng, mesh, 1 / eps, order, cells.MIRRORS)
+    except ng.ngstd.NgException as error:
+        raise OutOfRange(f"NGSolve, {rings} rings of order {order}: {error}") from None
+    if lower < _NONE * upper:  # mirrors of textbook scenes are walls: they join those at both sides
+        return upper * unit
+    return Interval(lower * (1 - _ROUNDING), upper * (1 + _ROUNDING)).times(unit)
 
 
-def _solved(ng: Any, mesh: Any, eps: Any, order: int) -> tuple[float, Any, int]:
-    """Energy over that of empty space, the potential, and unknowns."""
-    fes = ng.H1(mesh, order=order, dirichlet="top|bottom")
+def _energy(ng: Any, mesh: Any, eps: Any, order: int, ends: tuple[str, str]) -> float:
+    """Least energy of a function that is 0 at the first end and 1 at the second; unknowns within elements condensed."""
+    fes = ng.H1(mesh, order=order, dirichlet="|".join(ends))
     u, v = fes.TnT()
     field = ng.GridFunction(fes)
-    field.Set(ng.CF(1), definedon=mesh.Boundaries("top"))
-    form = ng.BilinearForm(eps * ng.grad(u) * ng.grad(v) * ng.dx, symmetric=True).Assemble()
+    field.Set(ng.CF(1), definedon=mesh.Boundaries(ends[1]))
+    form = ng.BilinearForm(eps * ng.grad(u) * ng.grad(v) * ng.dx, symmetric=True, condense=True).Assemble()
     residual = form.mat.CreateColVector()
     residual.data = form.mat * field.vec
-    field.vec.data -= form.mat.Inverse(fes.FreeDofs(), "sparsecholesky") * residual
-    energy = ng.Integrate(eps * ng.grad(field) * ng.grad(field), mesh, order=2 * order)  # 5 unless given
-    return float(energy), field, fes.ndof
+    field.vec.data -= form.mat.Inverse(fes.FreeDofs(coupling=True), "sparsecholesky") * residual
+    field.vec.data += form.harmonic_extension * field.vec
+    return float(ng.Integrate(eps * ng.grad(field) * ng.grad(field), mesh, order=2 * order))  # 5 unless given
 
 
 def boxes(grid: Grid, permittivity: Mapping[str, float], layers: int, order: int) -> float:
@@ -100,5 +111,5 @@ def boxes(grid: Grid, permittivity: Mapping[str, float], layers: int, order: int
     netgen_mesh.SetBCName(1, "top")
     for k in range(len(kinds)):
         netgen_mesh.SetMaterial(k + 1, f"m{k}")
-    energy, _, _ = _solved(ng, ng.Mesh(netgen_mesh), ng.CoefficientFunction(kinds.tolist()), order)
+    energy = _energy(ng, ng.Mesh(netgen_mesh), ng.CoefficientFunction(kinds.tolist()), order, cells.ENDS)
     return energy * EPS0_F_PER_M * M_PER_MM

@@ -1,6 +1,7 @@
 """Sensors from other CAD programs: materials, tools and terminals as a user has typed, written as a design."""
 
 import re
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -258,6 +259,8 @@ class BodyListing:
     ----------
     source : str
         Names of the files.
+    typed : tuple of str
+        Words of the command: the files, and how they are read.
     bodies : tuple of ListedBody
         All of them, with a suggested material; "?" where nothing suggests one.
     findings : tuple of Finding
@@ -265,11 +268,12 @@ class BodyListing:
     """
 
     source: str
+    typed: tuple[str, ...]
     bodies: tuple[ListedBody, ...]
     findings: tuple[Finding, ...]
 
     @classmethod
-    def of(cls, assembly: Assembly, folder: Path) -> "BodyListing":
+    def of(cls, assembly: Assembly, folder: Path, typed: Sequence[str]) -> "BodyListing":
         """The listing of an assembly, with materials that ship, are beside a folder, or the user's."""
         rows = []
         for body in assembly.bodies:
@@ -278,17 +282,21 @@ class BodyListing:
             faces = f"curved, met to {chord:g} mm" if chord else "flat"
             material = suggested(body.name, body.given.colour, folder) or "?"
             rows.append(ListedBody(body.name, body.volume_mm3(), x, y, z, body.given.colour, faces, material))
-        return cls(assembly.source, tuple(rows), assembly.findings)
+        return cls(assembly.source, tuple(typed), tuple(rows), assembly.findings)
 
     def document(self) -> Iterator[Part]:
         """All of it."""
         yield Table.of("bodies", "", self.bodies)
-        yield from apart(listed(self.findings), [f"To import it: {self.words()}"])
+        yield from apart(listed(self.findings), ["To import it:", *" \\\n  --map ".join(self._words()).split("\n")])
 
     def words(self) -> str:
         """Words to type to import it."""
-        maps = " ".join(f"--map {body.name}={body.material.replace('?', 'MATERIAL')}" for body in self.bodies)
-        return f"sensorgen import {self.source} {maps}"
+        return " --map ".join(self._words())
+
+    def _words(self) -> list[str]:
+        """Command, and the map of each body, as a shell reads them."""
+        maps = [shlex.quote(f"{body.name}={body.material.replace('?', 'MATERIAL')}") for body in self.bodies]
+        return [f"sensorgen import {shlex.join(self.typed)}", *maps]
 
 
 @dataclass(frozen=True)

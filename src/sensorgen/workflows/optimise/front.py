@@ -265,11 +265,16 @@ class Front(Search):
         return [Reason(words[alike], certified, count) for (alike, certified), count in found.most_common()]
 
     def nearest(self) -> Candidate | None:
-        """Where nothing meets the target: the design that violates the fewest constraints, and these the least."""
-        tried = [row for row in self.rows if row.violated]
-        return min(
-            tried, key=lambda row: (row.trial is None, len(row.violated), sum(row.violated.values())), default=None
-        )
+        """Where nothing meets the target: the design that violates the fewest constraints, and these the least.
+
+        Of several, the best by the objectives.
+        """
+
+        def order(row: Candidate) -> tuple[float, ...]:
+            aims = (worth(self.target, key, row) for key in self.target.objectives) if row.trial else ()
+            return row.trial is None, len(row.violated), sum(row.violated.values()), *aims
+
+        return min((row for row in self.rows if row.violated), key=order, default=None)
 
     def binding(self) -> list[Binding]:
         """Those first that most designs violate alone."""

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import partial
+from itertools import product
 from math import inf
 from pathlib import Path
 from statistics import median
@@ -228,17 +229,18 @@ def _under(target: Target, design: Design, key: str, top: str) -> float:
     return target.worth(key, numbers[key].lower) if key in numbers else -inf
 
 
+_OUTLINE = ("length_mm", "width_mm")  # which lines too wide or too narrow change together
+
+
 def within_tolerance(target: Target, design: Design) -> Iterator[Design]:
-    """The design with each length in the plane that is varied changed by the tolerance to both sides."""
-    data = design.model_dump(mode="json", exclude_unset=True, exclude={"name"})
-    for name, value in asdict(design.params).items():
-        if not (name.endswith("_mm") and name in target.parameters and target.tolerance_mm):
-            continue
-        if grid_mm(design, name) != design.layers.layer_mm:
-            for sign in (-1, 1):
-                parameters = data.get("parameters", {}) | {name: value + sign * target.tolerance_mm}
-                with suppress(SensorgenError):  # no such design
-                    yield make(data | {"parameters": parameters})
+    """The design with its outline, and with each other varied length in the plane, changed by the tolerance."""
+    data, own = design.model_dump(mode="json", exclude_unset=True, exclude={"name"}), asdict(design.params)
+    varied = sorted(own.keys() & target.parameters.keys() - set(_OUTLINE))
+    flat = [(n,) for n in varied if n.endswith("_mm") and grid_mm(design, n) != design.layers.layer_mm]
+    for names, sign in product((_OUTLINE, *flat) if target.tolerance_mm else (), (-1, 1)):
+        changes = {name: own[name] + sign * target.tolerance_mm for name in names if name in own}
+        with suppress(SensorgenError):  # no such design
+            yield make(data | {"parameters": data.get("parameters", {}) | changes})
 
 
 def _spreads(

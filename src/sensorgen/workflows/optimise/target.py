@@ -122,9 +122,9 @@ class Range(Strict):
 
 
 class Near(Strict):
-    """A value to come near."""
+    """A value to come near; no number is negative."""
 
-    near: Finite
+    near: Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class Limit(Strict):

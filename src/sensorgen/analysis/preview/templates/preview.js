@@ -161,9 +161,9 @@ function views(data, go, model) {
     go(number, to);
     model.mark(place);
     each(".section", svg => {
-      const { across, end, top } = svg.dataset, spot = svg.querySelector(".spot"), along = place[across];
-      spot.toggleAttribute("hidden", along > end);
-      spot.setAttribute("cx", along);
+      const { across, start, end, top } = svg.dataset, spot = svg.querySelector(".spot"), along = place[across];
+      spot.toggleAttribute("hidden", along < start || along > end);
+      spot.setAttribute("cx", along - start);
       spot.setAttribute("cy", top - z);
       spot.firstElementChild.textContent = words;
     });

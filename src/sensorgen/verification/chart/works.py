@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from sensorgen.verification.apart import ModelAnswer
 
 if TYPE_CHECKING:
+    from sensorgen.core.bounds import Interval
     from sensorgen.design.body import Body
     from sensorgen.prediction.mesh_ladder import Case
     from sensorgen.prediction.query import Query
@@ -17,25 +18,31 @@ if TYPE_CHECKING:
 def capacitance(
     model: str, scene: "Scene", permittivity: Mapping[str, float], width: float | None, count: float
 ) -> ModelAnswer:  # fmt: skip
-    """Of the whole sensor [F], by one of our models; ``width`` of the bounds is relative [-], or None."""
+    """Of ``count`` cells [F], by one of our models; ``width`` of the bounds is relative [-], or None."""
     module = import_module(f"sensorgen.models.{model}")
-    bounds = module.capacitance(scene, permittivity, *([] if width is None else [width]))
+    return bounded(module.capacitance(scene, permittivity, *([] if width is None else [width])), count)
+
+
+def bounded(bounds: "Interval", count: float) -> ModelAnswer:
+    """Bounds of one cell as those of ``count`` cells."""
     middle = (bounds.lower + bounds.upper) / 2
     return ModelAnswer((count * middle,), (bounds.upper - bounds.lower) / 2 / middle, certified=True)
 
 
 def formula(name: str, params: Any, eps_r: float, area_m2: float) -> ModelAnswer:
-    """Capacitance of the whole sensor as drawn [F], by a formula of the thesis."""
+    """Capacitance of an area as drawn [F], by a formula of the thesis."""
     from sensorgen.models import thesis_cells
 
     return ModelAnswer((area_m2 * thesis_cells.NAMED[name].value_f_per_m2(params, eps_r),))
 
 
 def peer(name: str, scene: "Scene", permittivity: Mapping[str, float], level: int, count: float) -> ModelAnswer:
-    """Capacitance of the whole sensor [F] by another program."""
+    """Capacitance of ``count`` cells [F] by another program, certified where it gives bounds."""
+    from sensorgen.core.bounds import Interval
     from sensorgen.verification import peers
 
-    return ModelAnswer((count * peers.levels(name, scene, permittivity)[level][1](),))
+    value = peers.levels(name, scene, permittivity)[level][1]()
+    return bounded(value, count) if isinstance(value, Interval) else ModelAnswer((count * value,))
 
 
 def rise_by_law(body: "Body", law: str, stress_pa: float) -> ModelAnswer:
@@ -61,7 +68,7 @@ def rise_by_mesh(case: "Case", level: int, stress_pa: float, stated: float) -> M
     return ModelAnswer((last.middle() / first.middle() - 1,), stated)
 
 
-def line(model: str, line: "PressedLine", fineness: Mapping[str, int]) -> ModelAnswer:
+def line(model: str, line: "PressedLine", fineness: Mapping[str, Any]) -> ModelAnswer:
     """Impedance at every frequency [ohm] by a model of lines, or by another program."""
     from sensorgen.verification.line_models import impedance
 

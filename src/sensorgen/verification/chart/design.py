@@ -1,18 +1,19 @@
-"""Quantities of a design: models and other programs that give them, and their references."""
+"""Speed against accuracy for one design: every model that applies to it, and other programs, timed in new processes."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
+from typing import Any, ClassVar
 
 import numpy as np
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design.body import Body
-from sensorgen.design.design import Design
 from sensorgen.design.values import film, permittivities
 from sensorgen.models import CapacitanceModel, capacitance_models, thesis_cells
+from sensorgen.models.compression import Plate
 from sensorgen.models.press2d import BoundaryConditions, Elastic
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import mesh_ladder, sensor_model
@@ -21,84 +22,91 @@ from sensorgen.prediction.compression_law import CLOSED_FORM, elastic, law_of
 from sensorgen.prediction.mesh_ladder import PressedPiece
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.rest_state import rest_state
-from sensorgen.prediction.sensor_model import piece
+from sensorgen.prediction.sensor_model import piece, rough_sensor
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.line.inputs import PressedLine, read
 from sensorgen.verification import line_models, peers
-from sensorgen.verification.apart import Work
-from sensorgen.verification.design_chart import works
+from sensorgen.verification.apart import Runner, apart
+from sensorgen.verification.chart import presses, works
+from sensorgen.verification.chart.question import (
+    DIGITS,
+    OWN,
+    Level,
+    Question,
+    Reference,
+    Series,
+    Values,
+    of_line,
+    of_modulus,
+)
+from sensorgen.verification.chart.results import Chart, best_of, measured
 
-OWN = "sensorgen"
+KEYS = ("capacitance", "compression", "line", "prediction")
 WIDTHS, WIDTHS_IN_3D = (1e-3, 1e-5, 1e-7), (1e-1, 1e-2, 1e-3, 1e-4)  # of the bounds of C, wanted
 ACCURACIES = (1e-1, 1e-2, 1e-3)
-DIGITS = 2.0**-52
 _SPATIAL = 3  # cost of a field solve in space
 
-Level = tuple[str, Work, float]
 
-
-@dataclass(frozen=True)
-class Series:
-    """A model, or another program, with its levels from coarse to fine; or why it does not apply.
+@dataclass(frozen=True, kw_only=True)
+class DesignChart(Chart):
+    """Speed against accuracy for one design.
 
     Attributes
     ----------
-    model, program : str
-        Name, and the program that it is of.
-    levels : tuple of (str, callable, float)
-        Words; work that gives an answer, of a module; expected time, 0 where unknown [s].
-    why_not : str
-        Why it has no levels.
+    design, body : str
+        Name, and what of it.
+    force_n, position_m : float
+        The load [N], [m].
     """
 
-    model: str
-    program: str
-    levels: tuple[Level, ...]
-    why_not: str = ""
+    design: str
+    body: str
+    force_n: float
+    position_m: float
+
+    ALT: ClassVar = (
+        "Hollow: cold, in a new process with nothing stored. Filled: warm, solved once more in the same process. "
+        "Dashed: Pareto front. Dotted: what the references are known to; no error is drawn below."
+    )
+
+    @property
+    def title(self) -> str:
+        """Title of its pictures."""
+        return f"Speed and accuracy for {self.design}"
+
+    def head(self) -> tuple[str, ...]:
+        """Design and body, and the load."""
+        return (f"{self.design}, {self.body}: {self.force_n:g} N at {self.position_m * 1e3:g} mm",)
 
 
-@dataclass(frozen=True)
-class Reference:
-    """Value that answers are compared with.
+def chart(
+    body: Body, query: Query, keys: Sequence[str] = KEYS, *, budget_s: float = 10.0,
+    step: Callable[[str], None] = lambda _: None, runner: Runner = apart,
+) -> DesignChart:  # fmt: skip
+    """Measure every model that applies to a body.
 
-    Attributes
+    Parameters
     ----------
-    name, program : str
-        In words, and the program that it is of.
-    value : tuple of complex
-        The answer.
-    doubt : float
-        Relative error of it [-].
+    body : Body
+        Drawn or printed.
+    query : Query
+        Frequencies and reference load.
+    keys : sequence of str
+        Of ``KEYS``; a prediction is compared with the best of capacitance and compression, which run for it too.
+    budget_s, step, runner : float, callable, callable
+        As of :func:`measured`.
+
+    Raises
+    ------
+    SensorgenError
+        Nothing can be predicted of the body.
     """
-
-    name: str
-    program: str
-    value: tuple[complex, ...]
-    doubt: float
-
-
-@dataclass(frozen=True)
-class Question:
-    """A quantity of a design.
-
-    Attributes
-    ----------
-    key, title, asked : str
-        Name, title of its panel, and the quantity in words.
-    series : tuple of Series
-        Models and programs.
-    references : tuple of Reference
-        Those that are known before anything runs.
-    measure : callable
-        From an answer and a reference to their relative distance.
-    """
-
-    key: str
-    title: str
-    asked: str
-    series: tuple[Series, ...]
-    references: tuple[Reference, ...]
-    measure: Callable[[tuple[complex, ...], tuple[complex, ...]], float]
+    needed = {*keys, *(KEYS[:2] if "prediction" in keys else ())}
+    asked = (question for question in questions(body, query) if question.key in needed)
+    whole, load = measured(asked, budget_s, step, runner).only(keys), query.load(body.design)
+    return DesignChart(
+        **vars(whole), design=body.design.name, body=body.provenance, force_n=load.force_n, position_m=load.position_m
+    )
 
 
 def questions(body: Body, query: Query) -> list[Question]:
@@ -113,27 +121,37 @@ def questions(body: Body, query: Query) -> list[Question]:
     sensor = sensor_model.rough_sensor(body, "", query.tip_of(body.design)).sensor
     stress_pa = float(sensor.stress_pa(load.force_n, load.position_m))
     return [
-        _capacitance(body), _compression(body, stress_pa), _line(sensor, query, body), _prediction(body, query),
+        _capacitance(body), _compression(body, stress_pa), _line(sensor, query, body), prediction(body, query),
     ]  # fmt: skip
 
 
 def _capacitance(body: Body) -> Question:
     scene, count = body.cells.first(), body.cells.count or 1.0  # 0 where every cell has a rim
-    eps = {v.material: v.value for v in permittivities(body.design)}
-    series = []
+    eps, params = {v.material: v.value for v in permittivities(body.design)}, body.design.params
+    area_m2 = params.length_mm * params.width_mm * M_PER_MM**2
+    series = (
+        *bounds(scene, lambda name, module: _bounds(name, module, scene, eps, count)),
+        *formulas(body.design.shape, params, eps, film(body.design), area_m2), *programs(scene, eps, count),
+    )  # fmt: skip
+    return Question("capacitance", "capacitance at rest", "C at rest", series)
+
+
+def bounds(scene: Scene, levels: Callable[[str, CapacitanceModel], Iterable[Level]]) -> Iterator[Series]:
+    """Our models of the capacitance of a scene, each with its levels."""
     for name, module in capacitance_models().items():
         why = module.why_not_applicable(scene) or ""
-        levels = () if why else tuple(_bounds(name, module, scene, eps, count))
-        series.append(Series(name, OWN, levels, why))
-    series += _formulas(body.design, eps)
+        yield Series(name, OWN, () if why else levels(name, module), why)
+
+
+def programs(scene: Scene, permittivity: Mapping[str, float], count: float) -> Iterator[Series]:
+    """Programs of others that give the capacitance of that many cells."""
     for name in peers.FIELD:
-        runs, why = peers.applicable(name, scene, eps)
+        runs, why = peers.applicable(name, scene, permittivity)
         levels = tuple(
-            (level.rstrip(", "), partial(works.peer, name, scene, eps, k, count), 0.0)
+            (level.rstrip(", "), partial(works.peer, name, scene, permittivity, k, count), 0.0)
             for k, (level, _) in enumerate(runs)
         )
-        series.append(Series(name, name, levels, why))
-    return Question("capacitance", "capacitance at rest", "C at rest", tuple(series), (), largest)
+        yield Series(name, name, levels, why)
 
 
 def _bounds(
@@ -146,12 +164,13 @@ def _bounds(
         yield (f"width {w:g}", work, expected(name, scene, w)[1] or 0.0) if w else ("", work, 0.0)
 
 
-def _formulas(design: Design, permittivity: Mapping[str, float]) -> Iterator[Series]:
-    """Formulas of the thesis for the shape of a design."""
-    area_m2 = design.params.length_mm * design.params.width_mm * M_PER_MM**2
+def formulas(
+    shape: str, params: Any, permittivity: Mapping[str, float], material: str, area_m2: float
+) -> Iterator[Series]:  # fmt: skip
+    """Formulas of the thesis for the capacitance of an area of a shape."""
     for name, law in thesis_cells.NAMED.items():
-        if design.shape in law.shapes:
-            work = partial(works.formula, name, design.params, permittivity[film(design)], area_m2)
+        if shape in law.shapes:
+            work = partial(works.formula, name, params, permittivity[material], area_m2)
             yield Series(f"thesis_cells: {name.removeprefix('thesis-')}", OWN, (("", work, 0.0),))
 
 
@@ -168,10 +187,10 @@ def _compression(body: Body, stress_pa: float) -> Question:
         ends = [works.rise_by_law(body, law, stress_pa).value[0].real for law in ("unconfined", "bonded")]
         middle = (ends[0] + ends[1]) / 2
         references = (Reference("between a free and a bonded plate", "laws", (middle,), abs(ends[0] / middle - 1)),)
-    elif any(each.levels for each in meshes):
+    elif not all(each.why_not for each in meshes):
         references = _published(body, elastic(body.design, pressed.scene), stress_pa)
     asked = f"rise of C at {stress_pa / 1e3:.4g} kPa"
-    return Question("compression", asked, asked, series, references, largest)
+    return Question("compression", asked, asked, series, references)
 
 
 def _laws(body: Body, rest: Answer, pressed: PressedPiece, stress_pa: float, *, plate: bool) -> Iterator[Series]:
@@ -206,8 +225,6 @@ def _meshes(body: Body, pressed: PressedPiece, stress_pa: float, *, plate: bool)
 
 def _published(body: Body, solids: Mapping[str, Elastic], stress_pa: float) -> tuple[Reference, ...]:
     """Published answers of two other programs for this very cell under this pressure, if there are any."""
-    from sensorgen.verification.chart import presses
-
     soft = all(
         name in presses.SOLIDS and np.isclose(solid.youngs_modulus_pa, presses.SOLIDS[name].youngs_modulus_pa)
         for name, solid in solids.items()
@@ -239,7 +256,7 @@ def pressed_line(sensor: Sensor, query: Query, position_m: float) -> PressedLine
     )  # fmt: skip
 
 
-def exact(line: PressedLine) -> tuple[complex, ...]:
+def exact(line: PressedLine) -> Values:
     """Impedance of a line at every frequency, in many digits [ohm]."""
     r, y, length = read(line).sections()
     return tuple(
@@ -253,16 +270,25 @@ def exact(line: PressedLine) -> tuple[complex, ...]:
 
 def _line(sensor: Sensor, query: Query, body: Body) -> Question:
     line = pressed_line(sensor, query, query.load(body.design).position_m)
-    series = [Series("pressure", OWN, (), "a flat tip presses evenly")]
-    for name, levels in line_models.LEVELS.items():
-        why = _why_no_line(name, sensor)
-        runs = tuple((line_models.words(how), partial(works.line, name, line, how), 0.0) for how in levels)
-        series.append(Series(name, name if name in line_models.PROGRAMS else OWN, () if why else runs, why))
+    series = (
+        Series("pressure", OWN, (), "a flat tip presses evenly"),
+        *lines(line, line_models.LEVELS, partial(_why_no_line, sensor)),
+    )
     known = (Reference("chain matrices in 220 digits", "decimal numbers", exact(line), DIGITS),)
-    return Question("line", "pressed line", "Z of the line, |Z| and Re Z", tuple(series), known, of_line)
+    return Question("line", "pressed line", "Z of the line, |Z| and Re Z", series, known, of_line)
 
 
-def _why_no_line(model: str, sensor: Sensor) -> str:
+def lines(
+    line: PressedLine, levels: Mapping[str, Sequence[Mapping[str, Any]]], why_not: Callable[[str], str]
+) -> Iterator[Series]:  # fmt: skip
+    """Models of lines, and programs of others, each with its levels or why it does not apply."""
+    for name, each in levels.items():
+        runs = tuple((line_models.words(how), partial(works.line, name, line, how), 0.0) for how in each)
+        why = why_not(name)
+        yield Series(name, name if name in line_models.PROGRAMS else OWN, () if why else runs, why)
+
+
+def _why_no_line(sensor: Sensor, model: str) -> str:
     """Why a model of lines does not apply to a sensor, or ""."""
     lossy = sensor.tan_delta or sensor.leak_s_per_m
     if model == "sheet" and (lossy or any(sensor.piezoresistance_per_pa)):
@@ -271,14 +297,16 @@ def _why_no_line(model: str, sensor: Sensor) -> str:
     return why or ("the film loses: its ladder has capacitors alone" if model == "ngspice" and lossy else "")
 
 
-def _prediction(body: Body, query: Query) -> Question:
+def prediction(body: Body, query: Query) -> Question:
+    """Impedance of a sensor under the load of a query, by whole predictions from rough to accurate."""
     free, fine = replace(query, law="unconfined"), [(f"{a:g}", replace(query, accuracy=a)) for a in ACCURACIES]
     rough = ("", partial(works.predicted, body, query, rough=True), 0.0)
     series = [Series("predict: closed forms", OWN, (rough,))]
     for name, levels in (("plate, free", [("", free)]), ("default", [("", query)]), ("accuracy", fine)):
         runs = [(level, partial(works.predicted, body, asked), _seconds(body, asked)) for level, asked in levels]
         series.append(Series(f"predict: {name}", OWN, tuple(runs)))
-    return Question("prediction", "whole prediction", "|Z| under the load", tuple(series), (), of_modulus)
+    by = partial(composed, body, query)
+    return Question("prediction", "whole prediction", "|Z| under the load", tuple(series), (), of_modulus, by)
 
 
 def _seconds(body: Body, query: Query) -> float:
@@ -288,16 +316,22 @@ def _seconds(body: Body, query: Query) -> float:
     return sum(c.expected_seconds or 0.0 for c in chosen)
 
 
-def largest(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
-    """Largest relative distance [-]."""
-    return max(abs(a / b - 1) for a, b in zip(answer, known, strict=True))
+def composed(body: Body, query: Query, best: Mapping[str, Sequence[Reference]]) -> Iterator[Reference]:
+    """Impedance of a line in many digits, with the best capacitance and the best rise of the others."""
+    model = rough_sensor(body, "", query.tip_of(body.design))
+    load = query.load(body.design)
+    query = replace(query, position_m=load.position_m)
+    if not all(best[key] for key in KEYS[:2]):
+        return
+    c, rise = (best_of(best[key], OWN) for key in KEYS[:2])
+    farad, rises = c.value[0].real, rise.value[0].real
 
+    def z(farad: float, rises: float) -> Values:
+        law = Plate("given", "", float(model.sensor.stress_pa(load.force_n, load.position_m)) * (1 + rises) / rises)
+        sensor = replace(model.sensor, capacitance_f_per_m=farad / model.sensor.length_m, compression=law)
+        return exact(pressed_line(sensor, query, load.position_m))
 
-def of_line(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
-    """The larger one of abs(Z) and of Re Z by itself, at the worst frequency [-]."""
-    return max(line_models.differences(answer, known))
-
-
-def of_modulus(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
-    """Of abs(Z), at the worst frequency [-]."""
-    return max(abs(abs(a) / abs(b) - 1) for a, b in zip(answer, known, strict=True))
+    value = z(farad, rises)
+    doubt = of_modulus(z(farad * (1 + c.doubt), rises), value) + of_modulus(z(farad, rises * (1 + rise.doubt)), value)
+    program = OWN if OWN in (c.program, rise.program) else "others"
+    yield Reference(f"C by {c.name}, rise by {rise.name}, line in 220 digits", program, value, doubt)
