@@ -19,6 +19,7 @@ from sensorgen.models.overlap import edge_fringe_f
 from sensorgen.prediction import bodies, compression_law
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.quantities import MULTIMETER, WEIGHT, WIDE
+from sensorgen.prediction.query import Query
 from sensorgen.prediction.results import _change
 
 pytestmark = pytest.mark.usefixtures("shared_cache")
@@ -164,6 +165,19 @@ def test_a_wide_range_names_the_measurement_that_narrows_it(tmp_path):
     top = found.resistance["top"]
     assert top.upper / top.lower <= said["top electrode"].left
     assert "top electrode" not in {n.quantity for n in found.narrowing}
+
+
+def test_a_permittivity_changes_the_rise_of_gaps_too():
+    """Of tri with X60 as its sources have it, solved anew: 1.27 times the sensitivity at most."""
+    pytest.importorskip("netgen", reason="solves a cell: pip install sensorgen[fem]")
+    design = make({"shape": "tri"})
+    known = evaluate(bodies.drawn(design)).sensitivity
+    (x60,) = (v for v in values.permittivities(design) if v.material == "x60")
+    for eps in spread(design, x60):
+        other = make({"shape": "tri", "material_values": {"x60": {"relative_permittivity": eps}}})
+        value = evaluate(bodies.drawn(other), Query(law="solved")).sensitivity.value
+        assert known.material.lower <= value <= known.material.upper
+    assert value > 1.2 * known.value
 
 
 def test_force_of_a_soft_print_is_narrowed_by_a_weight():

@@ -28,7 +28,7 @@ from sensorgen.design.tip import EVEN, TOPS
 from sensorgen.design.values import ENDS, MaterialValue, material_value, piezoresistance, resistivities, spread
 from sensorgen.design.walls import rule, rules
 from sensorgen.models import pressure
-from sensorgen.models.compression import averaged, beyond
+from sensorgen.models.compression import CapacitanceCurve, Compression, averaged, beyond
 from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.compression_law import CLOSED_FORM, Law, gap_m
@@ -170,13 +170,28 @@ def material_ends(model: SensorModel, reference: ReferenceLoad) -> Iterator[Assu
     for name, ratios in permittivity_ratios(design, model.body.cells.first()).items():
         value = next(v for v in model.rest.values if v.material == name and v.quantity == "relative_permittivity")
         low, high = spread(design, value)
-        ends = [replace(sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * ratio) for ratio in ratios]
+        ends = [
+            replace(
+                sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * ratio,
+                compression=by_permittivity(sensor.compression, ratio),
+            )
+            for ratio in ratios
+        ]  # fmt: skip
         yield Assumption(f"permittivity of {name}", f"{low:.3g} to {high:.3g}", "material", ends)
     farad, ohm = added(model.body)
     what = f"leads and edge, {_range_text([(1e12 * farad.least, 1e12 * farad.most)])} pF"
     yield Assumption("lead capacitance", what, "leads", [replace(sensor, lead_f=end) for end in farad[1:]])
     what = f"leads and contacts, {_range_text([ohm[1:]])} ohm"
     yield Assumption("contact resistance", what, "leads", [replace(sensor, lead_ohm=end) for end in ohm[1:]])
+
+
+def by_permittivity(law: Compression, ratio: float) -> Compression:
+    """Law of a cell whose capacitance at rest a permittivity makes so many times as large.
+
+    Where a gap in series closes, the relative rise is in proportion to C; a solid plate's stays. Solved: 1.25 times as
+    large in tri for a C of 1.19, 1.05 in rect, whose gaps hardly close, for 1.33.
+    """
+    return law.scaled_rise(ratio) if isinstance(law, CapacitanceCurve) else law
 
 
 def _electrodes(design: Design, sensor: Sensor) -> Iterator[Assumption]:

@@ -25,7 +25,7 @@ from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import rest_state as resting
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.compression_law import CLOSED_FORM, at_a_few_pressures
-from sensorgen.prediction.error_budget import error_budget, material_ends, modulus_range
+from sensorgen.prediction.error_budget import by_permittivity, error_budget, material_ends, modulus_range
 from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.identify import identify
 from sensorgen.prediction.plan import Plan
@@ -380,12 +380,12 @@ def _under_top(
 def _sensitivity(model: SensorModel, load: Load, query: Query, others: Otherwise) -> Bounds:
     """(C(p) / C(q) - 1) / (p - q); of the reference load from rest unless the query has pressures [1/kPa]."""
     of = partial(_mean_slope, range_pa=_range_pa(model.sensor, load, query))
-    value, moduli = of(model.law.compression), _moduli(model)
+    value, laws = of(model.law.compression), _by_materials(model)
     by_print = [_range([value, *(of(s.compression) if s else nan for s in sensors)]) for sensors in others]
     return Bounds.of(
-        value, "1/kPa", model=_span(value, of, model.law.others), material=_span(value, of, moduli),
+        value, "1/kPa", model=_span(value, of, model.law.others), material=_span(value, of, laws),
         print=_compounded(value, by_print),
-        open="upper" if any(refusal(OutOfRange, of, law) for law in moduli) else "",
+        open="upper" if any(refusal(OutOfRange, of, law) for law in laws) else "",
     )  # fmt: skip
 
 
@@ -461,9 +461,12 @@ def _span(value: float, of: Callable[[Compression], float], laws: Iterable[Compr
     return _range([value, *(of(law) for law in laws if refusal(OutOfRange, of, law) is None)])
 
 
-def _moduli(model: SensorModel) -> list[Compression]:
-    """The law of compression with all moduli at the ends of their ranges."""
-    return [model.law.compression.scaled_modulus(factor) for factor in modulus_range(model)[:2] if factor != 1]
+def _by_materials(model: SensorModel) -> list[Compression]:
+    """The law of compression with moduli and permittivities at the ends of their ranges."""
+    ratios = resting.permittivity_ratios(model.body.design, model.body.cells.first()).values()
+    of_c = [1.0, prod(low for low, _ in ratios), prod(high for _, high in ratios)]
+    factors = {1.0, *modulus_range(model)[:2]}
+    return [by_permittivity(model.law.compression.scaled_modulus(k), ratio) for k in factors for ratio in of_c]
 
 
 def _ranges_assumed(design: Design, values: Iterable[MaterialValue]) -> Iterator[str]:
