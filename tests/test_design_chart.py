@@ -92,8 +92,13 @@ def test_scenes_that_others_get_not():
     with pytest.raises(ValueError, match="more than two electrodes"):
         geometry.geometry(posts)
     cut = make({"shape": "tri", "parameters": {"length_mm": 9.3}}).in_use
-    with pytest.raises(ValueError, match="cuts its repeating cell"):
-        peers.levels("FastCap", cut, EPS)
+    low = flat((0.6, "x60")).bodies[0]
+    short = Body("short", "etpu", (box(0, 0.5, 0, 1, 0.9, 1.2),), "top")
+    for peer in peers.FIELD:
+        with pytest.raises(ValueError, match="cuts its repeating cell"):
+            peers.levels(peer, cut, EPS)
+        with pytest.raises(ValueError, match="air around it"):
+            peers.levels(peer, Scene((low, short), (1.0, 1.0, 1.2)), EPS)
 
 
 @pytest.mark.parametrize("name", ["line, seven tones", "line, 1 mHz to 100 MHz"])

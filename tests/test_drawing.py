@@ -368,12 +368,18 @@ def test_bands_of_a_curved_face_are_no_faces_and_have_no_dimensions() -> None:
     bottom = Body("bottom", "etpu", (box(0, 5, 0, 5, 0, 0.3),), "bottom")
     scene = Scene((bottom, Body("film", "x60", (box(0, 5, 0, 5, 0.3, 0.5),)), top), (5.0, 5.0, 1.2))
     assert faces_mm(top) == {0.5, 0.9, 1.2}
+    assert cones[0].levels_mm() == {round(z, 9) for _, z in rings}  # all of its bends, which models cut it at
     said = words(drawn(scene))
     assert {"0.17", "0.66", "0.25", "1.25"} <= set(said)
     assert not [word for word in said if re.fullmatch(r"0\.0[56]\d*", word)]
     step = banded(0.0, 0.0, (0.5, 0.0), (0.5, 0.35), (0.3, 0.35), (0.3, 0.6))
     tip = Polyhedron(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0.2, 0.2, 1.05)), ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)))
-    assert (step.levels_mm(), tip.levels_mm()) == ({0.0, 0.35, 0.6}, {0.0, 1.05})
+    assert (step.faces_mm(), tip.faces_mm()) == ({0.0, 0.35, 0.6}, {0.0, 1.05})
+
+
+def test_a_period_longer_than_the_view_is_drawn() -> None:
+    scene = scene_of("pillar", length_mm=73.0, width_mm=71.0, period_mm=20.0, side_mm=12.8)
+    assert "z [mm]" in words(drawn(scene))
 
 
 def test_the_period_survives_a_pattern_that_begins_within_one() -> None:

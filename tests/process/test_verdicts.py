@@ -1,12 +1,15 @@
 """Verdicts against the line model, yields against SciPy, and what Table D.1 says of itself."""
 
 from math import inf, isnan, nan
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from line_cases import PLATE
 from scipy import stats
 
+from sensorgen.analysis import comparison
+from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.measure.signal.verdicts import (
     WORDS,
@@ -151,6 +154,15 @@ def test_groups_count_what_is_known_only():
     assert tri.words == {"intact": 1, "short": 1, "unknown": 1}
     assert found[0].shorted.count == 0
     assert expected_from([of.ry_ohm[0] for of in made]) == 600
+
+
+def test_a_prediction_without_an_upper_end_leaves_readings_their_own():
+    """An electrode that one way to print interrupts; readings without R_Y and an open one are no usual value."""
+    words = SimpleNamespace(baked=None, batch="", specimen="s", instrument="")
+    of = SimpleNamespace(ry_ohm=Bounds.of(1000.0, "ohm", print=Interval(900.0, inf)), touches=False)
+    ohms = [(1100.0,), (1050.0,), (), (), (inf,)]
+    rows = [SimpleNamespace(y_ohm=y, z_ohm=(1e9,), shape="rect", specimen="s", words=words) for y in ohms]
+    assert comparison._usual_ohm(rows, [of] * len(rows))("rect", of) == pytest.approx(1075)
 
 
 def test_intervals_hold_where_plates_differ():

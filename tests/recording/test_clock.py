@@ -73,7 +73,7 @@ def test_a_time_that_does_not_rise_is_rebuilt_from_the_index():
     broken[200] = broken[199]
     found = rebuilt(len(TIME), broken, None)
     np.testing.assert_allclose(found.time_s, TIME, atol=1e-9)
-    assert "does not rise everywhere" in found.notes[0]
+    assert found.notes == ("the time of 11 samples does not rise: placed between their neighbours",)
     with pytest.raises(BadInput, match="no sampling times"):
         rebuilt(5, None, None)
     with pytest.raises(BadInput, match="does not rise"):
@@ -109,6 +109,14 @@ def test_lost_rows_are_a_gap_and_rounded_times_are_none(time, stamps, gap, withi
     got = rebuilt(len(truth), time, stamps)
     np.testing.assert_allclose(got.time_s - np.median(got.time_s - truth), truth, atol=within_s)
     assert np.flatnonzero(got.marks["gap"]).tolist() == [2000] * gap
+
+
+def test_one_repeated_time_leaves_the_others_as_they_are():
+    """Two rates one after the other: even steps would be 30 s off."""
+    rates = np.concatenate([np.arange(3000) / 100, 30 + np.arange(3000) / 50])
+    broken = rates.copy()
+    broken[1500] = broken[1499]
+    np.testing.assert_allclose(rebuilt(len(rates), broken, None).time_s, rates, atol=1e-9)
 
 
 def test_blocks_with_stamps_alone_lose_samples_once():

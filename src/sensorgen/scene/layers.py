@@ -167,8 +167,8 @@ def drawn(scene: Scene, boundaries_mm: tuple[float, ...]) -> tuple[LayerRegions,
 
 
 def faces_mm(body: Body) -> set[float]:
-    """Heights of a body's horizontal faces and edges [mm]."""
-    return {z for p in body.pieces for z in p.levels_mm()}
+    """Heights of a body's horizontal faces and edges, without those between facets of a curved one [mm]."""
+    return {z for p in body.pieces for z in getattr(p, "faces_mm", p.levels_mm)()}
 
 
 def region_at(body: Body, z_mm: float) -> Region:

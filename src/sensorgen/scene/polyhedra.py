@@ -107,6 +107,10 @@ class Polyhedron:
         return self.is_box()
 
     def levels_mm(self) -> set[float]:
+        """Heights of its corners [mm]."""
+        return {round(z, 9) for _, _, z in self.vertices}
+
+    def faces_mm(self) -> set[float]:
         """Heights of its level faces, ridges and tips; not of corners amid a flank, as a curved one has [mm]."""
         heights = [round(z, 9) for _, _, z in self.vertices]
         levels, rising, falling = set[float](), set[int](), set[int]()

@@ -344,7 +344,7 @@ def _usual_ohm(
         key = reading.shape, alone is not None
         if ohm < inf:
             every[key].append(ohm / alone.value if alone else ohm)
-        if alone and alone.lower <= ohm <= alone.upper:
+        if alone and alone.lower <= ohm <= alone.upper and ohm < inf:
             within[key].append(ohm / alone.value)
     medians = {key: expected_from(within[key] or values) for key, values in every.items()}
 

@@ -186,12 +186,12 @@ def _explained(kind: MeasurementKind, parameter: str) -> Explanation:
             return inf
 
     grid = np.linspace(low, high, _GRID).tolist()
-    at, step, before = min(grid, key=left), grid[1] - grid[0], left(log(start) if start else -inf)
+    at, step, before = min(grid[::-1], key=left), grid[1] - grid[0], left(log(start) if start else -inf)  # no plateau
     while step > _CLOSE:
         step /= 2
         at = min((max(at - step, low), at, min(at + step, high)), key=left)
     least = left(at)
-    share = 1 - least / before if before > 0 else 0.0
+    share = 1 - least / before if 0 < before < inf else 0.0
     if share < _FLAT:
         slope = _slope(kind, parameter, log(start)) if start else 0.0
         return Explanation(kind.name, parameter, start, unit, nan, slope, 0.0)

@@ -245,6 +245,7 @@ MAX_SKEW = 1e-3  # of two quartz clocks, with room to spare: more is a wrong rat
 _NEIGHBOURS = 5  # blocks at either side that must agree on a step
 _LATEST_S = 1e11  # since 1970: the year 5000; a larger number is no time
 _SAME_STEP = 1e-3  # relative difference of two steps that count as equal
+_FEW = 0.02  # share of samples whose time does not rise that are placed between their neighbours
 _LEAST_BLOCKS, _UNEQUAL = 8, 0.25  # fewer steps of another length, or less even ones, are gaps and not blocks
 _LAGS = (50, 2)  # of the run over the distance of stamps whose slope is the step: jumps need it, and it needs them
 
@@ -311,18 +312,33 @@ def _instrument_time(count: int, time_s: Real | None, stamp_s: Real | None, gap:
         if stamp_s is None or (count > 1 and np.count_nonzero(np.isfinite(stamp_s)) < 2):
             raise BadInput("no sampling times; expected a time, stamps, or a sampling rate")
         return _even(count, _block_starts(stamp_s), stamp_s), ()
+    time_s, between = _placed(time_s)
     first = _block_starts(time_s)
     even = _even(count, first, time_s)
     step, steps = even[-1] / max(count - 1, 1), np.diff(time_s)
     if len(first) and np.isfinite(time_s).all() and (steps > 0).all():
         least = max(step / 2, _OUTLIER * 1.4826 * float(np.median(np.abs(steps - step)))) if count > 1 else 0.0
         gap[1:] = (steps - step > least) & (steps <= PAUSE_S)  # a pause begins a part of the recording
-        return np.array(time_s, float), ()
+        return np.array(time_s, float), between
     note = f"the time does not rise everywhere: taken as even steps of {step:.6g} s"
     lost, set_back, notes = _followed(even, first, time_s)
     gap |= lost > 0
     even += np.cumsum(lost)
     return even + (np.nanmedian(time_s - set_back - even) if len(first) else 0.0), (note, *notes)
+
+
+def _placed(time_s: Real) -> tuple[Real, tuple[str, ...]]:
+    """A time that rises but at a few samples, with these between their neighbours, and a note; others as they are."""
+    index = np.arange(len(time_s))
+    rises = np.isfinite(time_s)
+    highest = np.maximum.accumulate(np.where(rises, time_s, -np.inf))
+    rises[1:] &= time_s[1:] > highest[:-1]
+    rises[:-1] &= ~(time_s[1:] < time_s[:-1])  # of two that were exchanged neither is known
+    few = int(np.count_nonzero(~rises))
+    if not 0 < few <= _FEW * len(time_s):
+        return time_s, ()
+    note = f"the time of {few} samples does not rise: placed between their neighbours"
+    return np.interp(index, index[rises], time_s[rises]), (note,)
 
 
 def _followed(even: Real, first: NDArray[np.intp], stamp_s: Real) -> tuple[Real, Real, tuple[str, ...]]:

@@ -245,7 +245,8 @@ def of_presses(worked: Processed, threshold_n: float = THRESHOLD_N) -> Ways:
         values = np.hstack([clean.real, clean.imag])
         try:
             way, late = hysteresis(force[during], values), hysteresis(late_n[during], values)
-            ways[press.start_s] = replace(way, error=np.hypot(way.error, late.share - way.share))
+            of_clock = late.share - way.share if np.isfinite(worked.clock_error_s) else np.nan
+            ways[press.start_s] = replace(way, error=np.hypot(way.error, of_clock))
         except BadInput as error:
             left_out.append(f"left out: press at {press.start_s:.6g} s: {error}")
     if not ways:

@@ -219,7 +219,7 @@ def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
 def _columns(view: View, edges: Sequence[float], reach: Sequence[float]) -> tuple[list[Measure], list[Measure]]:
     """Widths of the columns, unless there are too many, and of a period, where the view shows all of it."""
     steps = [Measure(a, b, ends) for (a, b), ends in zip(pairwise(edges), pairwise(reach), strict=True)]
-    repeats = view.period_mm and edges[-1] == view.period_mm[-1]
+    repeats = bool(edges and view.period_mm) and edges[-1] == view.period_mm[-1]
     whole = [Measure(edges[0], edges[-1], (reach[0], reach[-1]))] if repeats else []
     return steps if 1 < len(steps) <= MOST_COLUMNS else [], whole
 

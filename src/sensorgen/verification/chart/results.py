@@ -227,9 +227,12 @@ def _climbed(
         step()
         try:
             timed.append(runner(work))
-        except SensorgenError as error:
+        except (SensorgenError, MemoryError) as error:
             return done, f"{level}: {error}".removeprefix(": ")
-        if timed[-1].answer.value:
+        value = timed[-1].answer.value
+        if value and not all(math.isfinite(abs(part)) for part in value):
+            return done, f"{level}: its answer is {value[0]:g}".removeprefix(": ")
+        if value:
             done.append(Run(series, level, timed[-1]))
     return done, "" if done else series.why_not
 
@@ -246,6 +249,7 @@ def _last_s(timed: Sequence[TimedAnswer]) -> float:
 
 def _from(runs: Sequence[Run]) -> Iterator[Reference]:
     """References: the narrowest bounds and the finest answer of each program, with its last change as its doubt."""
+    runs = [run for run in runs if all(run.timed.answer.value)]  # a relative distance from 0 means nothing
     certified = [run for run in runs if run.timed.answer.certified]
     for program, bounds in by_key((run.series.program, run) for run in certified).items():
         run = min(bounds, key=lambda run: run.timed.answer.stated or 0.0)

@@ -62,16 +62,15 @@ def levels(peer: str, scene: Scene, permittivity: Mapping[str, float]) -> Levels
     Raises
     ------
     ValueError
-        The scene is neither a constant cross-section nor made of boxes, or has no mirrors; for FastCap also a cell
-        that the sensor's end cuts.
+        The scene is neither a constant cross-section nor made of boxes, or has no mirrors or a cell that its end cuts.
     """
     from sensorgen.verification.peers import cells
 
     geometry = cells.geometry(scene)
+    cells.share(geometry)  # refuses a cell that is cut: its weighted energies are those of another field
     words: list[tuple[str, tuple[int, ...]]]
     module = import_module(f"sensorgen.verification.peers.{_FILES[peer]}")
     if peer == "FastCap":
-        cells.share(geometry)  # refuses a cell that is cut
         work, words = module.capacitance, [(f"{n} panels along the height, ", (n,)) for n in _PANELS]
     else:
         flat = isinstance(geometry, cells.PlaneSection)

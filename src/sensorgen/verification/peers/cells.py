@@ -11,6 +11,7 @@ from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.repetition import Slice, cell
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import ROUNDING_MM, Section, sections
+from sensorgen.scene.slabs import is_open
 from sensorgen.solvers.electrostatics.bounds import unmirrored
 from sensorgen.solvers.electrostatics.boxes import Grid, grid
 
@@ -91,6 +92,8 @@ def geometry(scene: Scene) -> PlaneSection | Grid:
     """
     if reason := unmirrored(scene):
         raise ValueError(reason)
+    if is_open(scene):
+        raise ValueError("its field runs in the air around it, not between mirrors alone")
     cuts = sections(scene)
     if len(cuts) > 1:
         return grid(scene)
