@@ -1,5 +1,6 @@
 """Measured points of a chart, each compared with a known value, or with the best answer of another program."""
 
+import cmath
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +10,7 @@ from typing import Annotated, ClassVar, Self
 
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Facts, Part, Table, comma_separated
-from sensorgen.core.errors import SensorgenError
+from sensorgen.core.errors import OutOfRange, SensorgenError
 from sensorgen.core.lazy import by_key
 from sensorgen.verification import peers
 from sensorgen.verification.apart import ModelAnswer, Runner, TimedAnswer
@@ -226,15 +227,19 @@ def _climbed(
             return done, f"{level}: some {likely_s:.2g} s, more than --budget {budget_s:g}".removeprefix(": ")
         step()
         try:
-            timed.append(runner(work))
+            timed.append(_finite(runner(work)))
         except (SensorgenError, MemoryError) as error:
             return done, f"{level}: {error}".removeprefix(": ")
-        value = timed[-1].answer.value
-        if value and not all(math.isfinite(abs(part)) for part in value):
-            return done, f"{level}: its answer is {value[0]:g}".removeprefix(": ")
-        if value:
+        if timed[-1].answer.value:
             done.append(Run(series, level, timed[-1]))
     return done, "" if done else series.why_not
+
+
+def _finite(timed: TimedAnswer) -> TimedAnswer:
+    """An answer; OutOfRange where it is no number."""
+    if not all(map(cmath.isfinite, timed.answer.value)):
+        raise OutOfRange(f"its answer is {timed.answer.value[0]:g}")
+    return timed
 
 
 def _least(series: Series) -> int:
@@ -249,7 +254,6 @@ def _last_s(timed: Sequence[TimedAnswer]) -> float:
 
 def _from(runs: Sequence[Run]) -> Iterator[Reference]:
     """References: the narrowest bounds and the finest answer of each program, with its last change as its doubt."""
-    runs = [run for run in runs if all(run.timed.answer.value)]  # a relative distance from 0 means nothing
     certified = [run for run in runs if run.timed.answer.certified]
     for program, bounds in by_key((run.series.program, run) for run in certified).items():
         run = min(bounds, key=lambda run: run.timed.answer.stated or 0.0)
@@ -261,9 +265,10 @@ def _from(runs: Sequence[Run]) -> Iterator[Reference]:
 
 def _finest(series: Series, levels: Sequence[ModelAnswer]) -> Iterator[Reference]:
     """The finest answer; none from bounds, and none from a single level that states no error."""
-    finest, changes = levels[-1], [abs(levels[-1].value[0] / before.value[0] - 1) for before in levels[-2:-1]]
+    finest, before = levels[-1], [level for level in levels[-2:-1] if level.value[0]]
+    changes = [abs(finest.value[0] / level.value[0] - 1) for level in before]
     doubts = changes if finest.stated is None else [*changes, finest.stated]
-    if doubts and not finest.certified and series.model not in peers.SLOW_TO_CONVERGE:
+    if doubts and finest.value[0] and not finest.certified and series.model not in peers.SLOW_TO_CONVERGE:
         yield Reference(f"the finest {series.model}", series.program, finest.value, max(*doubts, DIGITS))
 
 
