@@ -6,7 +6,7 @@ import pytest
 
 from sensorgen.checks.review import review
 from sensorgen.design.design import make
-from sensorgen.scene.scene import Body, box
+from sensorgen.scene.scene import Body, Scene, box
 
 HAIR = 1e-6
 
@@ -174,3 +174,15 @@ def test_what_support_alone_holds_is_loose(sensor, findings, pin):
     pins = [Body("pin", "x60", (box(20 - pin, 20, 0, 20, 1.2, 1.4),))] if pin else []
     found = findings(sensor(*pins, Body("support", "bvoh", (support,)), Body("lid", "etpu", (lid,))), "9-loose")
     assert [(f.severity, f.body, f.layer) for f in found] == [("error", "lid", 15)] * (not pin)
+
+
+def test_a_raft_frees_the_sensor_and_one_of_two_lids_falls(sensor, findings):
+    """Support below everything holds nothing up; of two lids of one body the one over support alone falls."""
+    layers = [("support", "bvoh", -0.2), ("low", "etpu", 0.2), ("film", "x60", 0.6), ("high", "etpu", 1.0)]
+    raft = Scene(
+        tuple(Body(name, of, (box(0, 20, 0, 20, max(z, 0), z + 0.4),)) for name, of, z in layers), (20.0, 20.0, 1.4)
+    )
+    assert not findings(raft, "9-loose")
+    lids = Body("lids", "etpu", (box(0, 5, 0, 20, 1.2, 1.6), box(10, 15, 0, 20, 1.4, 1.6)))
+    below = Body("support", "bvoh", (box(10, 15, 0, 20, 1.2, 1.4),))
+    assert [(f.body, f.layer) for f in findings(sensor(below, lids), "9-loose")] == [("lids", 15)]

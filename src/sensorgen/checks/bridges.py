@@ -13,7 +13,8 @@ from sensorgen.checks.widths import TOUCH_MM, VANISHES, Slices
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality
-from sensorgen.scene.layers import EMPTY, LayerRegions, Region, cleaned, inside, is_rectilinear, narrow_mm, parts
+from sensorgen.scene.connections import groups
+from sensorgen.scene.layers import LayerRegions, Region, cleaned, inside, is_rectilinear, narrow_mm, parts, united
 from sensorgen.scene.scene import SLIVER_MM, Body
 
 
@@ -64,31 +65,34 @@ def _judged(
 
 
 def loose(slices: Slices) -> Iterator[Finding]:
-    """Findings about bodies of which nothing is joined to the first layer once soluble support is washed out."""
+    """Findings about bodies with a part that hangs on none of the rest once soluble support is washed out."""
     bodies = [b for b in slices.scene.bodies if not b.is_support()]
     if len(bodies) == len(slices.scene.bodies):
         return
-    joined = _joined([shapely.union_all([slices.body(b, k) for b in bodies]) for k in range(len(slices.layers))])
-    for body in bodies:
-        regions = np.array([slices.body(body, k) for k in range(len(joined))])
-        if shapely.area(shapely.intersection(regions, joined)).max() < SLIVER_MM**2:
-            first = int(np.argmin(shapely.is_empty(regions)))
-            at = regions[first].centroid
-            yield Finding(
-                "9-loose", "error", body.name, "nothing holds it once the support is washed out",
-                "let a body that stays reach from one to the other", layer=first + 1,
-                place_mm=(round(at.x, 3), round(at.y, 3), slices.layers.mids_mm[first]),
-            )  # fmt: skip
+    plans = [shapely.get_parts(united([slices.body(b, k) for b in bodies])) for k in range(len(slices.layers))]
+    held = _together(plans)
+    for body in bodies if not all(map(np.all, held)) else ():
+        for k, (plan, of) in enumerate(zip(plans, held, strict=True)):
+            stray = shapely.intersection(slices.body(body, k), shapely.union_all(plan[~of]))
+            if stray.area > SLIVER_MM**2:
+                yield Finding(
+                    "9-loose", "error", body.name, "nothing holds it once the support is washed out",
+                    "let a body that stays reach from one to the other", layer=k + 1,
+                    place_mm=(round(stray.centroid.x, 3), round(stray.centroid.y, 3), slices.layers.mids_mm[k]),
+                )  # fmt: skip
+                break
 
 
-def _joined(layers: Sequence[Region]) -> list[Region]:
-    """Parts of each layer that are joined to the first one, from below or from above."""
-    joined, area = [layers[0], *[EMPTY] * (len(layers) - 1)], 0.0
-    while area < (area := sum(region.area for region in joined)):
-        for k in (*range(1, len(layers)), *reversed(range(len(layers) - 1))):
-            plan, beside = shapely.get_parts(layers[k]), shapely.union_all(joined[max(k - 1, 0) : k + 2])
-            joined[k] = shapely.union_all(plan[shapely.area(shapely.intersection(plan, beside)) > SLIVER_MM**2])
-    return joined
+def _together(plans: Sequence[NDArray[np.object_]]) -> list[Mask]:
+    """Parts of each layer that hang together with the most of all layers."""
+    first, pairs = np.cumsum([0, *map(len, plans)]), [np.zeros((2, 0), np.int64)]
+    for start, (below, above) in zip(first, pairwise(plans), strict=False):
+        one, other = shapely.STRtree(below).query(above, predicate="intersects")
+        on = shapely.area(shapely.intersection(above[one], below[other])) > SLIVER_MM**2
+        pairs.append(np.stack([start + len(below) + one[on], start + other[on]]))
+    group = groups(int(first[-1]), *np.concatenate(pairs, axis=1))
+    most = np.bincount(group, shapely.area(np.concatenate(plans))).argmax()
+    return np.split(group == most, first[1:-1])
 
 
 def _grid(
