@@ -331,7 +331,8 @@ def test_streams_and_batches_agree():
     for name, error in (("force_n", 0), ("position_m", 1)):
         off = (getattr(stream, name) - getattr(batch, name))[told]
         assert (abs(off) < 0.05 * np.sqrt(batch.covariance[told, error, error])).all()
-    assert stream.covariance[told] == pytest.approx(batch.covariance[told], rel=1e-3)
+    # blocks of other sizes are rounded otherwise, by processor, so that a descent may end a step earlier
+    assert stream.covariance[told] == pytest.approx(batch.covariance[told], rel=5e-3)
     inner = told & (force > 1.0) & (abs(position - 0.05) < 0.04)
     ohm, *by = sensor.response(tones, force[inner, None], position[inner, None])
     j = np.stack(by, -1) / abs(ohm)[..., None] / NOISE
