@@ -13,7 +13,6 @@ from sensorgen.checks.widths import TOUCH_MM, VANISHES, Slices
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality
-from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, inside, is_rectilinear, narrow_mm, parts, united
 from sensorgen.scene.scene import SLIVER_MM, Body
 
@@ -85,6 +84,8 @@ def loose(slices: Slices) -> Iterator[Finding]:
 
 def _together(plans: Sequence[NDArray[np.object_]]) -> list[Mask]:
     """Parts of each layer that hang together with the most of all layers."""
+    from sensorgen.scene.connections import groups
+
     first, pairs = np.cumsum([0, *map(len, plans)]), [np.zeros((2, 0), np.int64)]
     for start, (below, above) in zip(first, pairwise(plans), strict=False):
         one, other = shapely.STRtree(below).query(above, predicate="intersects")
