@@ -442,11 +442,12 @@ def is_plate(answer: Answer, scene: Scene) -> bool:
 
     Where nothing stands between flat electrodes, all of a layer is air.
     """
-    from sensorgen.models import porous
     from sensorgen.scene.layers import is_solid
 
     widths = [c.width for c in answer.plan if c.model == answer.model and c.width is not None]
     if min(widths, default=answer.capacitance_f.width()) >= _EXACT:
         return is_solid(scene)
+    from sensorgen.models import porous
+
     filling = porous.filling(scene, dict.fromkeys((body.material for body in scene.bodies), 1.0))
     return filling is not None and filling.share > 1 - _SOLID
