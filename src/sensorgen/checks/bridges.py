@@ -83,7 +83,7 @@ def loose(slices: Slices) -> Iterator[Finding]:
 
 
 def _together(plans: Sequence[NDArray[np.object_]]) -> list[Mask]:
-    """Parts of each layer that hang together with the most of all layers."""
+    """Parts of each layer that are joined to the largest piece of all layers."""
     from sensorgen.scene.connections import groups
 
     first, pairs = np.cumsum([0, *map(len, plans)]), [np.zeros((2, 0), np.int64)]
