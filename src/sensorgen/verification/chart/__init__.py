@@ -1,1 +1,1 @@
-"""Speed against accuracy for one design: every model that applies to it, and other programs, timed in new processes."""
+"""Speed against accuracy of our models and of other programs, on scenes of known answers and for a design."""
