@@ -29,6 +29,7 @@ def _own_folders(monkeypatch, folder, cache=None):
     monkeypatch.setenv("SENSORGEN_LOG", str(own / "log.db"))
     monkeypatch.setenv("BROWSER", "true")  # opens nothing
     monkeypatch.setenv("SENSORGEN_BUDGET", "0")  # changes of designs are tried by the tests of that alone
+    monkeypatch.setattr("sensorgen.core.parallel.cores", lambda: 1)  # no process beside, but in the tests of that
     monkeypatch.setenv("SENSORGEN_SLICER", "none")  # verdicts by real slices are tested by those of that alone
     monkeypatch.setenv("SENSORGEN_MATERIALS", str(own / "materials"))
     monkeypatch.setenv("SENSORGEN_PACKS", str(own / "packs"))

@@ -1,6 +1,7 @@
 """``sensorgen predict|cell|compress``: what the bench should measure, and capacitance at rest and under pressure."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,7 +17,6 @@ from sensorgen.core.units import FREQUENCY_HZ, M_PER_MM
 from sensorgen.prediction.query import FLAT, Query
 
 if TYPE_CHECKING:
-    from sensorgen.design.body import Body
     from sensorgen.design.design import Design
     from sensorgen.prediction.compression import PressQuestion
     from sensorgen.prediction.loaded import Loaded
@@ -93,7 +93,7 @@ def predict_command(
         return _swept(design, body, query, sweeping, alone=not (pressing.loads() or plot))
     with render.progress(_WORK) as step:
         step(_WORK[0])
-        result = _answer(body(design), query, pressing, whole=bool(plot))
+        result = _answer(design, body, query, pressing, whole=bool(plot))
     prediction = result if isinstance(result, Prediction) else result.prediction
     if plot:
         _plot(result, plot)
@@ -115,15 +115,17 @@ def _swept(design: "Design", body: BodyChoice, query: Query, sweeping: Sweeping,
     return ended(sweeping.over(design, body, sweep, query))
 
 
-def _answer(body: "Body", query: Query, pressing: Pressing, *, whole: bool) -> Any:
+def _answer(design: "Design", body: BodyChoice, query: Query, pressing: Pressing, *, whole: bool) -> Any:
     """The prediction, with the impedance over force and position where one of them, or CSV, is asked for."""
     if pressing.loads() or whole or render.form() == "csv":
         from sensorgen.prediction.loaded import loaded
 
-        return loaded(body, query, pressing.force_n, pressing.position_mm)
-    from sensorgen.prediction.evaluate import evaluate
+        return loaded(body(design), query, pressing.force_n, pressing.position_mm)
+    from sensorgen.prediction import bodies
+    from sensorgen.prediction.evaluate import ahead, evaluate
 
-    prediction = evaluate(body, query)
+    with ahead(partial(bodies.drawn, design), query, wanted=not body.drawn):
+        prediction = evaluate(body(design), query)
     if prediction.capacitance and not prediction.budget and (query.law or query.tip != FLAT):
         raise BadInput(prediction.reason)
     return prediction

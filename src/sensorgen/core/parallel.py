@@ -303,6 +303,11 @@ class _Process(Lane):
         self.executor = _Process().executor
 
 
+def cores() -> int:
+    """Number of processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def used_s() -> float:
     """Processor time of this process and of those that it has started and that have ended [s]."""
     try:

@@ -1,24 +1,22 @@
 """Decision to print a design: verdict, the numbers that decide, findings, changes that were tried; and its page."""
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, wait
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sensorgen.checks.review import STEPS as CHECKS
 from sensorgen.checks.review import CheckReport, Review, Step, report
-from sensorgen.core.cache import Unknown, only_known
 from sensorgen.core.display import Boundless
 from sensorgen.core.document import Part, apart
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Refused, headline, listed
-from sensorgen.core.parallel import open_lanes, used_s
+from sensorgen.core.parallel import used_s
 from sensorgen.design.design import Design
 from sensorgen.prediction import bodies
-from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.evaluate import ahead, evaluate, is_stored
 from sensorgen.prediction.slices import PrintReview, reviewed
 from sensorgen.workflows.trial import Advice, Trial, table, trial
 
@@ -82,29 +80,19 @@ class RefusedBuild(Boundless, Refused):
 
 @contextmanager
 def beside(design: Design, *, predict: bool = True) -> Iterator[Callable[[], object]]:
-    """Another process that predicts an array's crossing beside slicing and checks of the whole; a call waits for it."""
-    ahead = list[Future[Any]]()
-    with ExitStack() as stack:
-        if predict and design.layout and not is_known(design.crossing):
-            (lane,) = stack.enter_context(open_lanes(1))
-            ahead.append(lane.submit(_predict, [(design.crossing,)]))
-        yield partial(wait, ahead)
+    """Another process that predicts beside slicing and checks: a drawing, or an array's crossing (a call waits)."""
+    of = partial(bodies.default_body, design.crossing) if design.layout else partial(bodies.drawn, design)
+    with ahead(of, wanted=predict) as ready:
+        yield ready if design.layout else _nothing
 
 
-def _predict(design: Design) -> None:
-    """Predict a design, for the stored prediction alone."""
-    with suppress(SensorgenError):  # which whoever asks for it meets and reports
-        evaluate(bodies.default_body(design))
+def _nothing() -> None:
+    """Wait for nothing: :func:`evaluate` waits for the drawing when it needs it."""
 
 
 def is_known(design: Design) -> bool:
-    """Test whether the prediction of a design is stored."""
-    try:
-        with only_known():
-            _predict(design)
-    except Unknown:
-        return False
-    return True
+    """Test whether the prediction of a design's print is stored."""
+    return is_stored(partial(bodies.default_body, design))
 
 
 def decision(
