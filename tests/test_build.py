@@ -2,19 +2,24 @@
 
 import hashlib
 import json
+import os
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from no_numbers import unpredicted
 from sensorgen.core import lazy as registry
+from sensorgen.core import parallel
 from sensorgen.core.cache import only_known
 from sensorgen.core.errors import Unprintable
 from sensorgen.design import design, shapes
 from sensorgen.export.threemf import FAMILIES
-from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction import bodies
+from sensorgen.prediction import evaluate as evaluating
+from sensorgen.prediction.evaluate import ahead, evaluate
+from sensorgen.prediction.results import timeless
 from sensorgen.workflows import build as workflow
-from sensorgen.workflows import decision
 from sensorgen.workflows.build import build
 
 DESIGNS = Path(__file__).parents[1] / "designs"
@@ -154,15 +159,12 @@ def test_a_crossing_is_predicted_in_another_process_to_the_same_files(tmp_path, 
     plan = {"length_mm": 10, "width_mm": 10, "pitch_x_mm": 5, "pitch_y_mm": 5, "column_mm": 4, "row_mm": 4}
     array = design.make({"shape": "array", "name": "a", "parameters": plan, "cell": {"shape": "reference"}})
     found = []
-    for ahead in (True, False):
-        monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / f"cache-{ahead}"))
-        if ahead:
-            monkeypatch.setattr(workflow, "evaluate", known_only)
-        else:
-            monkeypatch.setattr(workflow, "evaluate", evaluate)
-            monkeypatch.setattr(decision, "is_known", lambda _: True)
-        build(array, tmp_path / f"{ahead}", cad=False, force=True)
-        found.append(contents(tmp_path / f"{ahead}"))
+    for cores, predict in ((2, known_only), (1, evaluate)):
+        monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / f"cache-{cores}"))
+        monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
+        monkeypatch.setattr(workflow, "evaluate", predict)
+        build(array, tmp_path / f"{cores}", cad=False, force=True)
+        found.append(contents(tmp_path / f"{cores}"))
     assert found[0] == found[1]
     assert found[0]["a/prediction.json"]
 
@@ -170,3 +172,29 @@ def test_a_crossing_is_predicted_in_another_process_to_the_same_files(tmp_path, 
 def known_only(body):
     with only_known():
         return evaluate(body)
+
+
+def drawn_or_dead(parent, sensor):
+    """Body of a drawing; in any other process than the parent the end of it."""
+    if os.getpid() != parent:
+        os._exit(1)
+    return bodies.drawn(sensor)
+
+
+@pytest.mark.own_cache
+@pytest.mark.parametrize("dies", [False, True])
+def test_a_drawing_is_predicted_in_another_process_to_the_same_numbers(monkeypatch, dies):
+    """Or, where that process dies, in this one."""
+    monkeypatch.setattr(parallel, "cores", lambda: 2)
+    sensor = design.make({"shape": "reference", "parameters": {"length_mm": 11.0}})
+    alone, here, work = evaluate(bodies.estimated(sensor), keep=False), [], evaluating._computed
+    monkeypatch.setattr(evaluating, "_computed", lambda body, query: here.append(body.is_drawn) or work(body, query))
+    of = partial(drawn_or_dead, os.getpid(), sensor) if dies else partial(bodies.drawn, sensor)
+    with ahead(of):
+        both = evaluate(bodies.estimated(sensor))
+    assert here == ([False, True] if dies else [False])
+    assert timeless(both) == timeless(alone)
+    here.clear()
+    with ahead(of):
+        assert evaluate(bodies.estimated(sensor)) == both
+    assert here == []

@@ -195,7 +195,7 @@ def test_a_cut_period_is_a_length_in_the_plane_and_its_island_goes_too():
 def test_what_rules_refuse_in_whole_periods_too_is_refused_with_the_rule(monkeypatch, shared_cache):
     def with_an_island(design, walls=""):
         island = Finding("9-bridge", "error", "film", "an island starts in mid-air", "")
-        return Review({}, [island] * (design.params.period_mm != 2.0))
+        return Review(design, [island] * (design.params.period_mm != 2.0))
 
     monkeypatch.setattr(compensation, "review", with_an_island)
     monkeypatch.setattr(compensation, "_MOST_SOLVED", 9)

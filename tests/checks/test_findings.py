@@ -32,6 +32,24 @@ def test_findings_come_with_the_worst_first_and_complete():
         assert f.layer is not None or f.place_mm is not None
 
 
+@pytest.mark.own_cache
+def test_a_review_is_read_again_and_made_anew_for_other_waivers_walls_or_values(monkeypatch):
+    first, steps = review(make(BAD)), []
+    again = review(make(BAD), steps.append)
+    assert (again.findings, again.fits, again.meshes.keys(), steps) == (
+        first.findings, first.fits, first.meshes.keys(), []
+    )  # fmt: skip
+    others = (make(BAD | {"waivers": [{"rule": "5", "reason": "known"}]}), ""), (make(BAD), "classic"), (
+        make(BAD | {"parameters": BAD["parameters"] | {"width_mm": 4.5}}), ""
+    )  # fmt: skip
+    for other, walls in others:
+        review(other, steps.append, walls)
+        assert "checks" in steps
+        steps.clear()
+    large = make({"shape": "reference", "parameters": {"length_mm": 900.0}})
+    assert review(large).fits is review(large).fits is False
+
+
 def test_the_margin_is_negative_on_either_side_of_the_limit():
     assert Finding("9-bridge", "error", "b", "m", "a", value_mm=0.3, limit_mm=0.22).margin_mm == -0.08
     assert Finding("5-width", "error", "b", "m", "a", value_mm=0.1, limit_mm=0.12).margin_mm == -0.02

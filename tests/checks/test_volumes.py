@@ -3,7 +3,8 @@
 import pytest
 import shapely
 
-from sensorgen.checks.volumes import LayerVolume, findings, rows
+from sensorgen.checks.volumes import findings, rows
+from sensorgen.core.findings import LayerVolume
 from sensorgen.design.design import make
 from sensorgen.scene.layers import drawn
 from sensorgen.scene.scene import Body, Scene, box

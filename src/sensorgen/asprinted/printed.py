@@ -16,9 +16,8 @@ import numpy as np
 import shapely
 
 from sensorgen.checks import estimate, volumes
-from sensorgen.checks.volumes import LayerVolume
 from sensorgen.core.errors import BadInput
-from sensorgen.core.findings import Finding
+from sensorgen.core.findings import Finding, LayerVolume
 from sensorgen.design.design import Design
 from sensorgen.design.walls import WALLS
 from sensorgen.scene.geometry import meshes

@@ -1,19 +1,23 @@
 """Design rule check: exact gap, valid bodies, and the findings of every rule about a design on its printer."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields, replace
-from typing import Self
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from hashlib import sha256
+from typing import TYPE_CHECKING
 
-from sensorgen.checks import estimate, rules
+from sensorgen.core import cache
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Part, Table, comma_separated
 from sensorgen.core.findings import Finding, Verdict, counted, counts, headline, listed, table, verdict
+from sensorgen.core.records import adapter
 from sensorgen.design.design import Design
 from sensorgen.design.printer import tower
 from sensorgen.design.walls import rule
-from sensorgen.scene.geometry import meshes
-from sensorgen.scene.geometry.meshes import Mesh
-from sensorgen.scene.scene import Scene
+
+if TYPE_CHECKING:  # a review that is stored does without NumPy
+    from sensorgen.scene.geometry.meshes import Mesh
+    from sensorgen.scene.scene import Scene
 
 Step = Callable[[str], None]
 STEPS = ("meshes", "checks", "validity")
@@ -23,11 +27,17 @@ _WIDENED = ("2-printed-gap", "5-width", LOST)  # rules that larger widths or a l
 
 @dataclass(frozen=True, eq=False)
 class Review(Displayed):
-    """The printed bodies as meshes, by name, and all findings about them, with their source."""
+    """All findings about a design, with their source; ``fits`` is False where no bed holds it."""
 
-    meshes: dict[str, Mesh]
+    design: Design = field(repr=False)
     findings: list[Finding]
     source: str = "rules of the drawing"
+    fits: bool = True
+
+    @cached_property
+    def meshes(self) -> "dict[str, Mesh]":
+        """The printed bodies, by name."""
+        return _meshes(self.design)
 
     def document(self) -> Iterator[Part]:
         """Verdict, then the findings."""
@@ -37,10 +47,6 @@ class Review(Displayed):
     def table(self) -> Table:
         """The findings."""
         return table(self.findings)
-
-    def with_meshes(self, design: Design) -> Self:
-        """Review with the meshes that a misfit on the bed had spared."""
-        return self if self.meshes else replace(self, meshes=_meshes(design))
 
     def errors(self, strict: bool = False) -> list[Finding]:
         """Findings that stop a build: errors, and when ``strict`` warnings, that the design does not waive.
@@ -63,7 +69,7 @@ class Review(Displayed):
 
 
 def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Review:
-    """Check a design as it lies on the bed.
+    """Check a design as it lies on the bed, or read what was found before.
 
     Whether bodies overlap is looked at last, and only when nothing else is wrong: it takes longest.
 
@@ -81,25 +87,41 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
     SensorgenError
         A name or value of the design is missing.
     """
+    walls = walls or rule("prusa", design.walls)
+    decides = repr((design.machine, design.layers, design.regions, design.waivers))
+    question = {
+        "what": "review", "design": design.id(), "walls": walls, "decides": sha256(decides.encode()).hexdigest()
+    }  # fmt: skip
+    findings = adapter(list[Finding])
+    if (known := cache.known(question)) is not None:
+        return Review(design, findings.validate_python(known["findings"]), fits=known["fits"])
+    result = _computed(design, step, walls)
+    cache.keep(question, {"findings": findings.dump_python(result.findings, mode="json"), "fits": result.fits})
+    return result
+
+
+def _computed(design: Design, step: Step, walls: str) -> Review:
+    from sensorgen.checks import estimate, rules
+    from sensorgen.scene.geometry import meshes
+
     misfit = design.waived(list(rules.bed_findings(design.printed, design.machine)))
     if any(not f.waiver for f in misfit):  # a sensor that no bed holds may be too large to mesh, too
         step("checks")
-        return Review({}, misfit)
+        return Review(design, misfit, fits=False)
     scene = design.printed
     step("meshes")
     meshed = _meshes(design)
     step("checks")
     gap_mm = meshes.electrode_gap_mm(scene, meshed)
-    findings = rules.findings(
-        scene, design.machine, design.layers, gap_mm, walls or rule("prusa", design.walls), estimate.lines(design)
-    ) + _crowding(design)
+    findings = rules.findings(scene, design.machine, design.layers, gap_mm, walls, estimate.lines(design))
+    findings += _crowding(design)
     findings = [advised(f, [p.name for p in fields(design.params)]) for f in findings]
     if not any(f.severity == "error" and f.rule != LOST for f in findings):
         step("validity")
         advice = "change the parameters; if they make sense, this is a fault of sensorgen: report it"
         faults = meshes.faults(scene, meshed)
         findings = [*(Finding("0-body", "error", body, what, advice) for body, what in faults), *findings]
-    return Review(meshed, design.waived(findings) + design.idle_waivers(findings))
+    return Review(design, design.waived(findings) + design.idle_waivers(findings))
 
 
 def advised(finding: Finding, parameters: list[str]) -> Finding:
@@ -112,7 +134,9 @@ def advised(finding: Finding, parameters: list[str]) -> Finding:
     return replace(finding, advice=finding.advice.replace("dielectric_mm", films)) if films else finding
 
 
-def _meshes(design: Design) -> dict[str, Mesh]:
+def _meshes(design: Design) -> "dict[str, Mesh]":
+    from sensorgen.scene.geometry import meshes
+
     return {body.name: meshes.mesh(body) for body in design.printed.bodies}
 
 
@@ -181,7 +205,7 @@ def report(design: Design, reviewed: Review) -> CheckReport:
     )  # fmt: skip
 
 
-def draw(design: Design, reviewed: Review, printed: Scene | None = None, source: str = "") -> str:
+def draw(design: Design, reviewed: Review, printed: "Scene | None" = None, source: str = "") -> str:
     """The drawing of the cross-section, as SVG, with what is printed outlined over it if that is given."""
     from sensorgen.scene import drawing
 

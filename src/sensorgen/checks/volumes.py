@@ -1,65 +1,19 @@
 """Rule 7: printed against drawn volume of every body in every layer, and the parts that are lost or merged."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import groupby, pairwise
 
 import numpy as np
 import shapely
 
 from sensorgen.core.document import Column, Table
-from sensorgen.core.findings import Finding
+from sensorgen.core.findings import Finding, LayerVolume
 from sensorgen.scene.layers import LayerRegions, Region, drawn, parts
-from sensorgen.scene.scene import SLIVER_MM, Body, Point, Scene
+from sensorgen.scene.scene import SLIVER_MM, Body, Scene
 
 LOW, HIGH = 0.9, 1.1  # printed over drawn volume, within which nothing is said
 VANISHED = 0.1  # a part of which less than this share is printed is lost
 _LEAST = 1e-6  # of the sensor's plan, in one layer: less is rounding
-
-
-@dataclass(frozen=True)
-class LayerVolume:
-    """One body in one layer.
-
-    Attributes
-    ----------
-    body : str
-        Its name.
-    layer : int
-        From 1 at the bed [-].
-    bottom_mm, top_mm : float
-        Where the layer starts and ends [mm].
-    exact_mm3, printed_mm3 : float
-        Volume as drawn, and as printed [mm3].
-    strips, vanished, fused : int
-        Separate parts as drawn, those that are lost, and those that merge with a neighbour [-].
-    place_mm : (float, float)
-        Middle of the first lost part, or else of the first, at its front or left edge [mm].
-    ratio : float or None
-        Printed over drawn volume; None where nothing is drawn. From these two [-].
-    """
-
-    body: str
-    layer: int
-    bottom_mm: float
-    top_mm: float
-    exact_mm3: float
-    printed_mm3: float
-    strips: int
-    vanished: int
-    fused: int
-    place_mm: Point
-    ratio: float | None = None
-
-    def __post_init__(self) -> None:
-        """Derive the ratio."""
-        if self.exact_mm3 > 0:
-            object.__setattr__(self, "ratio", self.printed_mm3 / self.exact_mm3)
-
-    @property
-    def grown(self) -> bool:
-        """True if more is printed than drawn."""
-        return self.printed_mm3 > self.exact_mm3
 
 
 def table(rows: Sequence[LayerVolume]) -> Table:

@@ -1,4 +1,4 @@
-"""Findings of checks, as data and for people."""
+"""Findings of checks, and volumes that are printed, as data and for people."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -79,6 +79,51 @@ class Finding:
         x, y, z = self.place_mm or (0.0, 0.0, 0.0)
         at = f" ({'first ' if self.count > 1 else ''}at x {x:g}, y {y:g}, z {z:g} mm)" if self.place_mm else ""
         return f"{self.message}{at} {f'accepted: {self.waiver}' if self.waiver else f'-> {self.advice}'}"
+
+
+@dataclass(frozen=True)
+class LayerVolume:
+    """Volume of one body in one layer.
+
+    Attributes
+    ----------
+    body : str
+        Its name.
+    layer : int
+        From 1 at the bed [-].
+    bottom_mm, top_mm : float
+        Where the layer starts and ends [mm].
+    exact_mm3, printed_mm3 : float
+        Volume as drawn, and as printed [mm3].
+    strips, vanished, fused : int
+        Separate parts as drawn, those that are lost, and those that merge with a neighbour [-].
+    place_mm : (float, float)
+        Middle of the first lost part, or else of the first, at its front or left edge [mm].
+    ratio : float or None
+        Printed over drawn volume; None where nothing is drawn. From these two [-].
+    """
+
+    body: str
+    layer: int
+    bottom_mm: float
+    top_mm: float
+    exact_mm3: float
+    printed_mm3: float
+    strips: int
+    vanished: int
+    fused: int
+    place_mm: tuple[float, float]
+    ratio: float | None = None
+
+    def __post_init__(self) -> None:
+        """Derive the ratio."""
+        if self.exact_mm3 > 0:
+            object.__setattr__(self, "ratio", self.printed_mm3 / self.exact_mm3)
+
+    @property
+    def grown(self) -> bool:
+        """True if more is printed than drawn."""
+        return self.printed_mm3 > self.exact_mm3
 
 
 @dataclass(frozen=True)

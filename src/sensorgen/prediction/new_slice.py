@@ -7,12 +7,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-
-from sensorgen.asprinted import printed as asprinted
 from sensorgen.checks.review import GCODE
-from sensorgen.checks.volumes import LayerVolume
-from sensorgen.core.findings import Finding
+from sensorgen.core.findings import Finding, LayerVolume
 from sensorgen.core.records import adapter
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
@@ -21,6 +17,7 @@ from sensorgen.export.gcode.results import Checked, Lifting
 from sensorgen.export.slicers import TIME_LIMIT_S
 
 if TYPE_CHECKING:
+    from sensorgen.asprinted.printed import Printed
     from sensorgen.export.gcode.crossings import Lifted
 
 
@@ -101,7 +98,7 @@ class NewSlice:
         About the file.
     content : bytes
         The file.
-    printed : asprinted.Printed
+    printed : Printed
         By the first convention for a line's width.
     lifted : Lifted
         The file, followed.
@@ -109,7 +106,7 @@ class NewSlice:
 
     report: SliceReport
     content: bytes
-    printed: asprinted.Printed
+    printed: "Printed"
     lifted: "Lifted"
 
     def record(self) -> dict[str, Any]:
@@ -126,7 +123,10 @@ def slice_now(
 
     Parameters and errors as of :func:`sensorgen.export.slicing.sliced`; with ``strict`` warnings refuse the file, too.
     """
+    import numpy as np
+
     from sensorgen.asprinted import agreement, pinholes
+    from sensorgen.asprinted.printed import nominal
     from sensorgen.export import slicing
     from sensorgen.export.gcode.check import check_motion
 
@@ -136,7 +136,7 @@ def slice_now(
         )
         content = made.ready.read_bytes()
     printer, loaded = design.machine, {design.tool(name): name for name in design.used()}
-    printed = asprinted.nominal(design, made.lines, f"{made.slicer} {made.version}")
+    printed = nominal(design, made.lines, f"{made.slicer} {made.version}")
     checked = check_motion(made.lifted.motion, printer, loaded, others_empty=True, texts=design.own).with_more(
         agreement.check(
             design, made.lines, made.lifted.motion, printer.bed_centre_mm(), alone=True, lines=printed.lines
@@ -156,6 +156,3 @@ def slice_now(
         printed=Volumes(tuple(printed.rows), (*made.findings, *findings)), lifting=made.lifted.lifting,
     )  # fmt: skip
     return NewSlice(report, content, printed, made.lifted)
-
-
-SHORT, IDLE = "1-short", "10-waiver"

@@ -3,9 +3,8 @@
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from sensorgen.asprinted import printed as asprinted
-from sensorgen.checks import bridges
 from sensorgen.checks.review import GCODE, LOST, Review, Step, advised, review
 from sensorgen.core.errors import MissingValue
 from sensorgen.core.findings import Finding, grouped
@@ -15,7 +14,10 @@ from sensorgen.design.walls import SLICERS, WALLS, rule
 from sensorgen.prediction.print_files import NONE, PrintFile, at_hand
 from sensorgen.prediction.results import unpredicted
 
-SHORT, IDLE = "1-short", "10-waiver"
+if TYPE_CHECKING:
+    from sensorgen.asprinted.printed import Printed
+
+SHORT, IDLE, UNSUPPORTED = "1-short", "10-waiver", "9-support"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -33,10 +35,10 @@ class PrintReview(Review):
     drawn: Review
     file: PrintFile | None
 
-    def printed(self, design: Design, walls: str = "") -> asprinted.Printed:
+    def printed(self, design: Design, walls: str = "") -> "Printed":
         """The print that the findings are about."""
         walls = walls or rule("prusa", design.walls)
-        return self.file.printed(design) if self.file else asprinted.body(design, walls=walls)
+        return self.file.printed(design) if self.file else _estimated(design, walls)
 
     def errors(self, strict: bool = False) -> list[Finding]:
         """Findings that stop a build: errors of the drawing, and when ``strict`` all errors and warnings."""
@@ -71,9 +73,15 @@ def reviewed(
 def estimated(design: Design, drawn: Review, walls: str = "", why: str = "") -> PrintReview:
     """Findings about a drawing and about its print by the rules of slicers."""
     walls, shorts = walls or rule("prusa", design.walls), list[Finding]()
-    if drawn.meshes and all(f.rule != SHORT for f in drawn.findings):
-        shorts = [f for f in asprinted.body(design, walls=walls).findings() if f.rule == SHORT]
+    if drawn.fits and all(f.rule != SHORT for f in drawn.findings):
+        shorts = [f for f in _estimated(design, walls).findings() if f.rule == SHORT]
     return combined(design, drawn, f"estimated ({WALLS[walls]}){why and f': {why}'}", shorts)
+
+
+def _estimated(design: Design, walls: str) -> "Printed":
+    from sensorgen.asprinted import printed
+
+    return printed.body(design, walls=walls)
 
 
 def of_own_machine(design: Design) -> list[Finding]:
@@ -111,7 +119,7 @@ def combined(
         The print's G-code.
     """
     own = of_own_machine(design)
-    replaced = (IDLE,) if source.startswith("estimated") else (IDLE, LOST, bridges.RULE)
+    replaced = (IDLE,) if source.startswith("estimated") else (IDLE, LOST, UNSUPPORTED)
     names = [parameter.name for parameter in fields(design.params)]
     try:
         permittivities(design), resistivities(design)
@@ -121,4 +129,4 @@ def combined(
     findings = list(map(partial(_at_crossing, design), findings))
     waived = [f if f.rule == GCODE else w for f, w in zip(findings, design.waived(findings), strict=True)]
     listed = grouped([*waived, *design.idle_waivers(findings)])
-    return PrintReview(drawn.meshes, listed, source, drawn=drawn, file=file)
+    return PrintReview(design, listed, source, drawn.fits, drawn=drawn, file=file)

@@ -171,7 +171,6 @@ def build(
         review = reviewed(design, step, folder=folder)
         if review.errors(strict) and not force:
             raise Unprintable(review.findings, review.errors(strict), review.source)
-        review = review.with_meshes(design)
         stage = stack.enter_context(store.staging(folder))
         job = None
         if cad:

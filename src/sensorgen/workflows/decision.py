@@ -123,7 +123,7 @@ def decision(
     """
     tried, start_s = None, used_s()
     reason = "" if predict else "checks alone (--budget 0)"
-    if predict and held.meshes:
+    if predict and held.fits:
         step("prediction")
         try:
             tried = trial(design, held=held)

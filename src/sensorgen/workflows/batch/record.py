@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 from statistics import geometric_mean
 from typing import Any
 
-from sensorgen.checks.volumes import LayerVolume
 from sensorgen.core.display import Boundless
 from sensorgen.core.document import Column, Part, Table, to_json
 from sensorgen.core.errors import MissingValue
 from sensorgen.core.files import seal
-from sensorgen.core.findings import Finding
+from sensorgen.core.findings import Finding, LayerVolume
 from sensorgen.core.units import si
 from sensorgen.design import materials
 from sensorgen.export.gcode.results import Checked
