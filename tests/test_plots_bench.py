@@ -60,3 +60,17 @@ def test_the_page_has_every_tone_and_asks_no_network(run):
     assert "http:" not in head
     assert "https:" not in head
     assert "src=" not in head
+
+
+def test_many_recordings_on_a_page_share_its_points(run):
+    """Thirty take little more room than ten, and each stretch of a curve keeps its least and its largest value."""
+
+    def drawn(together):
+        figures = bench.series(run, "", together), bench.differences(run, "reactance", "", together)
+        raw, surface = (next(iter(figure.choices.values()))[0].content[0] for figure in figures)
+        return raw, np.size(surface.values)
+
+    (one, whole), (ten, _), (thirty, least) = map(drawn, (1, 10, 30))
+    assert len(thirty.y) <= len(ten.y) <= 202 < len(one.y)
+    assert (min(thirty.y), max(thirty.y)) == (min(one.y), max(one.y))
+    assert least < whole / 5

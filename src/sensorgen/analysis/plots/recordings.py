@@ -14,6 +14,7 @@ from sensorgen.analysis.plots.figure import (
     BLUE,
     COLOURS,
     GREEN,
+    MOST_POINTS,
     ORANGE,
     SKY,
     Axis,
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from sensorgen.measure.signal.run import Hysteresis
 
 PARTS = {"resistance": ("R", "real"), "reactance": ("X", "imag")}
+_FEWEST = 200  # points of a curve, however many recordings are on a page
 _TIME, _FORCE, _POSITION = Axis("time [s]"), Axis("force [N]"), Axis("position [mm]")
 
 
@@ -64,15 +66,19 @@ class DrawnRecording:
     pairs: "Pairs | None"
 
 
-def series(run: DrawnRecording, key: str = "time") -> Figure:
-    """R and X over time at each frequency: raw, filtered, before and under each load."""
+def series(run: DrawnRecording, key: str = "time", together: int = 1) -> Figure:
+    """R and X over time at each frequency: raw, filtered, before and under each load.
+
+    ``together``, the number of recordings on a page, divides the points of a curve.
+    """
+    most = max(MOST_POINTS // together, _FEWEST)
 
     def panels(k: int, at: str) -> Iterator[Panel]:
         for symbol, part in PARTS.values():
             raw, smooth = (getattr(z[:, k], part) for z in (run.raw_ohm, run.filtered_ohm))
             divisor, unit = scale(raw, "Ω")
-            curves = [_line("raw", run.time_s, raw / divisor, SKY),
-                      _line("filtered", run.filtered_s, smooth / divisor, BLUE)]  # fmt: skip
+            curves = [_line("raw", run.time_s, raw / divisor, SKY, most),
+                      _line("filtered", run.filtered_s, smooth / divisor, BLUE, most)]  # fmt: skip
             if run.pairs is not None:
                 for name, z, how in (("before", run.pairs.before_ohm, {"colour": GREEN, "symbol": "circle-open"}),
                                      ("pressed", run.pairs.pressed_ohm, {"colour": ORANGE})):  # fmt: skip
@@ -86,25 +92,28 @@ def series(run: DrawnRecording, key: str = "time") -> Figure:
     )  # fmt: skip
 
 
-def _line(name: str, time_s: Real, values: Real, colour: str) -> Curve:
-    at = thinned(values)
+def _line(name: str, time_s: Real, values: Real, colour: str, most: int) -> Curve:
+    at = thinned(values, most)
     return Curve("line", name, time_s[at], values[at], colour=colour)
 
 
-def differences(run: DrawnRecording, part: str, key: str = "") -> Figure:
+def differences(run: DrawnRecording, part: str, key: str = "", together: int = 1) -> Figure:
     """Change of "resistance" or "reactance" by the loads over force and position, at each frequency.
+
+    ``together``, the number of recordings on a page, makes the grid coarser, to a third at most.
 
     Raises
     ------
     BadInput
         As :func:`sensorgen.measure.signal.presses.surface`; no loads.
     """
-    from sensorgen.measure.signal.presses import surface
+    from sensorgen.measure.signal.presses import POINTS, surface
 
     pairs, (symbol, share) = run.pairs, PARTS[part]
     if pairs is None:
         raise BadInput(f"{run.name}: no loads of known force")
-    through = surface(pairs.force_n, pairs.position_mm, getattr(pairs.difference_ohm, share))
+    grid = max(round(POINTS / together**0.5), POINTS // 3)
+    through = surface(pairs.force_n, pairs.position_mm, getattr(pairs.difference_ohm, share), grid)
 
     def panels(k: int, at: str) -> Iterator[Panel]:
         divisor, unit = scale(through.values[..., k], "Ω")

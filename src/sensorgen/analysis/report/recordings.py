@@ -189,10 +189,10 @@ def figures(recorded: Sequence[RecordedRun]) -> Iterator[Figure]:
     yield from compared(recorded)
     for run in recorded:
         key = f"{run.entry.number}-{run.source.lockin}" + f"-{run.source.part}" * bool(run.source.part)
-        yield plots.series(run, f"series-{key}")
+        yield plots.series(run, f"series-{key}", len(recorded))
         for part in plots.PARTS:
             try:
-                yield plots.differences(run, part, f"{part}-{key}")
+                yield plots.differences(run, part, f"{part}-{key}", len(recorded))
             except SensorgenError:  # no loads, or all on one line: there is no surface
                 continue
 
