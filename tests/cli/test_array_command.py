@@ -81,6 +81,7 @@ def test_build_writes_the_wires(run, file, tmp_path, monkeypatch):
         (("check", "array", "--pitch-x", "4mm", "--column", "4mm"), "leaves no space between columns"),
         (("invert", "a.yaml", "none.npz"), "none.npz"),
         (("invert", "a.yaml", "f.csv", "--perfect"), "--perfect is for lines"),
+        (("invert", "a.yaml", "f.csv", "--gcode", "none.gcode"), "none.gcode"),
         (("invert", "a.yaml", "f.csv"), "no frequency of the readings"),
         (("invert", "a.yaml", "g.csv"), "frequency_hz is 1 kHz to 10 kHz; expected one frequency in all frames"),
         (("invert", "a.yaml", "f.csv", "-o", "f.h5"), "--output f.h5: expected a name in .npz"),

@@ -17,6 +17,7 @@ from sensorgen.core.errors import BadInput, within
 from sensorgen.core.options import Argument, Option
 
 if TYPE_CHECKING:
+    from sensorgen.cli.designs import BodyChoice
     from sensorgen.core.arrays import Real
     from sensorgen.core.document import Documented
     from sensorgen.design.design import Design
@@ -124,8 +125,8 @@ _OF_LINES = ("perfect", "law", "prior", "force_limit_n", "newest")
 _OF_DESIGNS = ("rest_file", "noise", "prior", "newest", "force_limit_n")
 
 
-def invert(design: "Design", task: Task, frames: ArrayFrames) -> int:
-    """Pressure maps of an array's frames."""
+def invert(design: "Design", task: Task, frames: ArrayFrames, body: "BodyChoice") -> int:
+    """Pressure maps of an array's frames, by a body of one crossing."""
     from sensorgen.measure.array_frames import read
     from sensorgen.prediction.array.frames import inverted
     from sensorgen.prediction.array.model import array_model
@@ -136,7 +137,7 @@ def invert(design: "Design", task: Task, frames: ArrayFrames) -> int:
         raise BadInput(f"--output {task.output}: expected a name in .npz (maps) or .csv (a row for each frame)")
     refuse_typed(_OF_LINES, "is for lines; an array is inverted with --readout, --input, --noise and --scatter")
     refuse_input(frames.readout)
-    model = array_model(design)
+    model = array_model(design, body=body(design.crossing))
     shape = (model.here.shape[0], model.here.shape[1])
     read_in = read(Path(task.measured), shape, frames.frequency_hz)
     apart = read(Path(task.rest_file), shape, read_in.frequency_hz).at_rest() if task.rest_file else None
