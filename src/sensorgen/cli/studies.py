@@ -27,6 +27,12 @@ if TYPE_CHECKING:
 Drift = Annotated[float, Option(kind="proper share", typed="10%")]
 
 
+def _refuse_array(design: "Design") -> None:
+    """Refuse an array, of which one crossing would be taken for the sensor."""
+    if design.layout:
+        raise BadInput(f"{design.name} is an array; expected a sensor of one top electrode, or 'sensorgen array'")
+
+
 @of_design("stack", *render.options())
 def stack_command(
     design: "Design", *, force_n: Force, position_mm: Annotated[float | None, Option(zero=True)] = None,
@@ -48,6 +54,7 @@ def stack_command(
     """
     from sensorgen.prediction.double_layer import study
 
+    _refuse_array(design)
     position_m = None if position_mm is None else position_mm * units.M_PER_MM
     return study(design, frequency_hz, force_n, position_m, noise, drift, within_n, law, tip_mm * units.M_PER_MM)
 
@@ -80,6 +87,7 @@ def sheet_command(
     from sensorgen.prediction.sensor_model import sensor_model
     from sensorgen.prediction.sheet_study import PLACES, study
 
+    _refuse_array(design)
     model = sensor_model(body(design), Query(law=law))[0]
     wanted, places = contacts or ("" if pads else "all"), PLACES**2
     names = [*(["pads"] if pads else []), *(name for name in SETS if wanted in (name, "all"))]
