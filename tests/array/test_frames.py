@@ -1,6 +1,7 @@
 """Frames to pressure maps: truth by another formulation of the network, coverage, missing readings, files."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from sensorgen.analysis.plots import array as plots
 from sensorgen.analysis.plots import static
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.array_frames import read
+from sensorgen.measure.array_frames import of_frames, read
 from sensorgen.measure.virtual.array import foot, nodal, printed, simulated, step, walked
 from sensorgen.prediction.array import frames as frames_module
 from sensorgen.prediction.array.frames import PressureMaps, inverted
@@ -231,6 +232,24 @@ def fields(model, sizes_kpa, length_mm, count, noise_kpa):
     sigma = np.where(np.isnan(kpa), np.nan, noise_kpa)
     shape = (len(kpa), 5, 6)
     return true, PressureMaps(model, "by hand", np.arange(len(kpa)) / 100, kpa.reshape(shape), sigma.reshape(shape))
+
+
+def test_sessions_by_two_terminals_are_calibrated_as_such(model, tmp_path):
+    """They were taken as guarded: C/C0 of a press on some squares alone was that of all around it."""
+    readout, true = ArrayReadout("two-terminal", noise=1e-4), model.under(PRESSURE[0])[0]
+    frames = frames_of(model, readout, pressures_pa=PRESSURE[:1])
+    np.savez(
+        tmp_path / "s.npz", siemens=frames, rest=[1, 1, 1, 0], time_s=np.arange(4.0), frequency_hz=10e3,
+        pressure_kpa=np.stack([np.zeros((5, 6))] * 3 + [PRESSURE[0] / 1e3]),
+    )  # fmt: skip
+    by_two, guarded = (
+        of_frames([tmp_path / "s.npz"], model, readout=kind)[0].reading[3].reshape(5, 6) + 1
+        for kind in ("two-terminal", "guarded")
+    )
+    assert by_two == pytest.approx(true, abs=5e-4)
+    assert np.nanmax(np.abs(guarded - true)) > 0.1
+    with pytest.raises(BadInput, match="a calibration of guarded frames; expected no two-terminal ones"):
+        maps(model, readout, frames, calibration=SimpleNamespace(readout="guarded"))
 
 
 def test_lost_crossings_are_the_conditional_mean_of_a_gaussian_field(model, monkeypatch):

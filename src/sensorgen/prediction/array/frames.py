@@ -129,11 +129,14 @@ class PressureMaps:
         return per_kpa * self.filled[0], per_kpa * self.filled[1]
 
     def _summed(self, sigma: Real) -> Real:
-        """Standard error of a sum over crossings by those of its terms, with their signs, (k, m, n)."""
+        """Standard error of a sum over crossings by those of its terms, with their signs, (k, m, n).
+
+        What a calibration leaves is no noise: there correlations make no error less.
+        """
         square = (sigma**2).sum((1, 2))
         if self.correlation is not None:
             noise = np.where(np.isfinite(self.pressure_kpa), self.noise * sigma, 0.0).reshape(len(sigma), -1)
-            square = np.maximum(square + ((noise @ self.correlation) * noise).sum(1), 0.0)
+            square += np.maximum(((noise @ self.correlation) * noise).sum(1), 0.0 if self.calibration else -square)
         return np.asarray(np.sqrt(square))
 
     @cached_property
@@ -604,6 +607,8 @@ class MapInverter:
         sigma = np.hypot(noise, self.scatter * pressure)
         given = _known(sigma) & self.own & np.isfinite(ratio) & self._same_sign(siemens)
         if calibration:
+            if calibration.readout not in ("", self.readout.kind):
+                raise BadInput(f"a calibration of {calibration.readout} frames; expected no {self.readout.kind} ones")
             by += f"; {calibration.law.form.words()} of each element, calibrated"
             mean, half = calibration.of_ratio(ratio, time_s, calibration.counted(day), past)
             pressure, sigma = PA_PER_KPA * mean, PA_PER_KPA / NORMAL_90 * half
