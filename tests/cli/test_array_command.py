@@ -109,6 +109,9 @@ def test_build_writes_each_tile(run, tmp_path, monkeypatch):
     for row in rows:
         files = {path.name for path in (tmp_path / "out" / row["design"]).iterdir()}
         assert {"wires.csv", f"{row['design']}.prusa.3mf", f"{row['design']}.html"} <= files
+    words = " ".join(run("array", "strip.yaml").out.split())
+    assert "2 columns, 12 crossings" in words
+    assert "2 tiles are printed, of 10 wires together" in words  # 8 wires are of the one print that is not made
 
 
 def test_the_shape_has_options_like_others(run):

@@ -146,7 +146,7 @@ def array_command(
         raise BadInput(f"--simulate {simulate}: expected a name that ends in .npz")
     how = ArrayReadout(readout, input_ohm, frequency_hz, noise, noise_s or 0.0)  # type: ignore[arg-type]
     model = array_model(design)
-    resolution = study(model, how, pressure_kpa, faults, short or 0.0)
+    resolution = replace(study(model, how, pressure_kpa, faults, short or 0.0), notes=_tiled(design))
     if simulate is not None:
         from sensorgen.measure.virtual.array import step
 
@@ -157,6 +157,23 @@ def array_command(
         render.file(plot / f"{design.name}-array.png", static.png(array.resolution(resolution)), "wrote ")
         render.file(plot / f"{design.name}-array.html", array.page(resolution, *_foot(model, how)), "wrote ")
     return resolution
+
+
+def _tiled(design: "Design") -> tuple[str, ...]:
+    """That an array is not printed as the one print that its numbers are of, if so."""
+    from sensorgen.workflows.tiles import tiles
+
+    try:
+        placed = tiles(design)
+    except BadInput as error:
+        return (f"not printable: {error}",)
+    if not placed:
+        return ()
+    first, wires = placed[0][0].design, sum(tile.rows + tile.columns for tile, _ in placed)
+    return (
+        f"larger than the bed: {len(placed)} tiles are printed, of {wires} wires together; the numbers are of one "
+        f"print (of a tile: sensorgen array out/{first}/design.json)",
+    )
 
 
 def _foot(model: "ArrayModel", readout: "ArrayReadout") -> "tuple[PressureMaps, Real]":

@@ -113,6 +113,8 @@ class ArrayStudy:
         Distance from which two presses are seen as two; infinite of none [mm].
     short : float
         Probability that a crossing is shorted, P(short) of its print [-].
+    notes : tuple of str
+        What is said of its print.
     """
 
     model: ArrayModel
@@ -123,6 +125,7 @@ class ArrayStudy:
     faults: tuple[str, ...] = ()
     apart_mm: float = np.inf
     short: float = 0.0
+    notes: tuple[str, ...] = ()
 
     @property
     def determined(self) -> Mask:
@@ -144,6 +147,7 @@ class ArrayStudy:
                 f"{p.pitch[0]:.4g} x {p.pitch[1]:.4g} mm, {len(model.wires())} wires; {model.crossing.body.provenance}"
             ),
         )
+        yield from (("print", note) for note in self.notes)
         yield "crossing", f"{model.capacitance.words()} at rest, {self._rises()}"
         edges = model.fringe
         words = (
@@ -257,6 +261,7 @@ class ArrayStudy:
             "apart_mm": self.apart_mm if np.isfinite(self.apart_mm) else None,
             "frames_per_s": 1 / self.readout.frame_s(self.model),
             "faults": self.faults,
+            "notes": self.notes,
             "yield": self.whole if self.short else None,
         }
 
