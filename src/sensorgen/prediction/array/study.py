@@ -147,7 +147,6 @@ class ArrayStudy:
                 f"{p.pitch[0]:.4g} x {p.pitch[1]:.4g} mm, {len(model.wires())} wires; {model.crossing.body.provenance}"
             ),
         )
-        yield from (("print", note) for note in self.notes)
         yield "crossing", f"{model.capacitance.words()} at rest, {self._rises()}"
         edges = model.fringe
         words = (
@@ -203,7 +202,7 @@ class ArrayStudy:
 
     def document(self) -> Iterator[Part]:
         """Cell, tracks, readout, and a table of what is resolved."""
-        yield Facts(tuple(self._facts()))
+        yield Facts((*self._facts(), *(("print", note) for note in self.notes)))
         yield ""
         sigma, force = (each[self.model.here & self.determined] for each in (self.sigma_kpa, self.sigma_n))
         if not sigma.size:
