@@ -10,6 +10,7 @@ import shapely
 
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.geometry import meshes
+from sensorgen.scene.layers import outlines
 from sensorgen.scene.polyhedra import Loft, Polyhedron
 from sensorgen.scene.revolved import CHORD_MM, Revolved
 from sensorgen.scene.scene import Body, Move, Prism, Scene, area_mm2, box, content, rectangle
@@ -121,6 +122,15 @@ def _hollow_cube() -> Polyhedron:
     outer, inner = (Loft(rectangle(a, b, a, b), rectangle(a, b, a, b), a, b).polyhedron() for a, b in ((0, 3), (1, 2)))
     inside = tuple(tuple(k + len(outer.vertices) for k in t[::-1]) for t in inner.triangles)
     return Polyhedron(outer.vertices + inner.vertices, outer.triangles + inside)
+
+
+def test_holes_that_nearly_begin_at_one_line_are_cut_as_if_they_did():
+    """A round line's rounding parted two holes by 5e-6 um, and GEOS refused to clip a print to nothing."""
+    off = 5e-9
+    holes = [shapely.box(4, 1, 6, 3), shapely.box(4 + off, 5, 6, 8), shapely.box(4 + 3 * off, 9, 5, 9.5)]
+    cut = list(outlines(shapely.box(0, 0, 10, 10) - shapely.union_all(holes)))
+    assert area(cut) == pytest.approx(100 - 4 - 6 - 0.5, abs=1e-6)
+    assert min(np.ptp(outline, axis=0).min() for outline in cut) == pytest.approx(0.5, abs=1e-6)
 
 
 @pytest.mark.parametrize("piece", EVERY.values(), ids=EVERY)

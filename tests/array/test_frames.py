@@ -1,6 +1,7 @@
 """Frames to pressure maps: truth by another formulation of the network, coverage, missing readings, files."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from sensorgen.analysis.plots import array as plots
 from sensorgen.analysis.plots import static
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.array_frames import read
+from sensorgen.measure.array_frames import of_frames, read
 from sensorgen.measure.virtual.array import foot, nodal, printed, simulated, step, walked
 from sensorgen.prediction.array import frames as frames_module
 from sensorgen.prediction.array.frames import PressureMaps, inverted
@@ -233,6 +234,24 @@ def fields(model, sizes_kpa, length_mm, count, noise_kpa):
     return true, PressureMaps(model, "by hand", np.arange(len(kpa)) / 100, kpa.reshape(shape), sigma.reshape(shape))
 
 
+def test_sessions_by_two_terminals_are_calibrated_as_such(model, tmp_path):
+    """They were taken as guarded: C/C0 of a press on some squares alone was that of all around it."""
+    readout, true = ArrayReadout("two-terminal", noise=1e-4), model.under(PRESSURE[0])[0]
+    frames = frames_of(model, readout, pressures_pa=PRESSURE[:1])
+    np.savez(
+        tmp_path / "s.npz", siemens=frames, rest=[1, 1, 1, 0], time_s=np.arange(4.0), frequency_hz=10e3,
+        pressure_kpa=np.stack([np.zeros((5, 6))] * 3 + [PRESSURE[0] / 1e3]),
+    )  # fmt: skip
+    by_two, guarded = (
+        of_frames([tmp_path / "s.npz"], model, readout=kind)[0].reading[3].reshape(5, 6) + 1
+        for kind in ("two-terminal", "guarded")
+    )
+    assert by_two == pytest.approx(true, abs=5e-4)
+    assert np.nanmax(np.abs(guarded - true)) > 0.1
+    with pytest.raises(BadInput, match="a calibration of guarded frames; expected no two-terminal ones"):
+        maps(model, readout, frames, calibration=SimpleNamespace(readout="guarded"))
+
+
 def test_lost_crossings_are_the_conditional_mean_of_a_gaussian_field(model, monkeypatch):
     """Mean k' (K + n)^-1 y and covariance k - k' (K + n)^-1 k', by matrices over all 30 crossings."""
     monkeypatch.setattr("sensorgen.prediction.array.frames._LENGTHS", (1.7,))
@@ -270,7 +289,37 @@ def test_a_light_load_beside_a_heavy_one_counts_in_the_centre_and_noise_does_not
     x, _, error, _ = found.centre_mm
     true = (load[0].sum(0) @ model.layout.x_mm) / load[0].sum()
     assert x.mean() == pytest.approx(true, abs=0.5)  # 5 mm nearer to the heel without them
-    assert 0.5 < error.mean() / x.std() < 1.2  # which of them count varies, too
+    across = 10 * np.sqrt((load[0].sum(0) ** 2).sum() / 12) / load[0].sum()  # anywhere in the 10 mm of each column
+    assert 0.5 < np.sqrt(error.mean() ** 2 - across**2) / x.std() < 1.2  # which of them count varies, too
+
+
+def test_a_press_on_one_square_lies_anywhere_on_it(model):
+    """Evenly likely in 10 mm: 10 / sqrt(12). A press of five errors was lost in the noise of the 25 around it."""
+    draw, kpa = np.random.default_rng(2), np.zeros((300, 5, 6))
+    kpa[:, 2, 3] = 200.0
+    _, _, dx, dy = PressureMaps(model, "by hand", np.arange(300.0), kpa, np.full(kpa.shape, 1e-3)).centre_mm
+    assert np.array([dx, dy]) == pytest.approx(10 / 12**0.5, rel=1e-4)
+    noisy = kpa / 10 + 4.0 * draw.normal(size=kpa.shape)
+    x, _, dx, _ = PressureMaps(model, "by hand", np.arange(300.0), noisy, np.full(kpa.shape, 4.0)).centre_mm
+    off = x + draw.uniform(-5, 5, 300) - model.layout.x_mm[3]
+    assert np.mean(np.abs(off[np.isfinite(x)]) < 1.96 * dx[np.isfinite(x)]) > 0.9
+
+
+@pytest.mark.parametrize("kind", ["guarded", "two-terminal"])
+def test_the_error_of_the_total_force_counts_what_errors_of_crossings_share(model, kind):
+    """Resistive tracks mix readings: independent errors gave half of the scatter guarded, and four times it by two."""
+    ohm = 50.0
+    resistive = replace(
+        model, row_ohm=model.row_ohm.times(ohm, "ohm"), column_ohm=model.column_ohm.times(ohm, "ohm"),
+        lead_ohm=tuple(ohm * each for each in model.lead_ohm),
+    )  # fmt: skip
+    readout, draw = ArrayReadout(kind), np.random.default_rng(3)
+    exact = frames_of(model, readout, ohm=ohm, pressures_pa=PRESSURE[:1])[2:].repeat((50, 200), axis=0)
+    noise = readout.noise * np.abs(exact) * (draw.normal(size=exact.shape) + 1j * draw.normal(size=exact.shape))
+    found = inverted(resistive, readout, exact + noise, np.arange(250) < 50, np.arange(250.0), scatter=0.0)
+    assert found.by.startswith("the network")
+    force, error = found.force_n
+    assert error.mean() == pytest.approx(force.std(), rel=0.15)
 
 
 def test_readings_of_no_capacitance_are_no_numbers(model):

@@ -159,7 +159,7 @@ def test_findings_name_the_crossing():
         ({"parameters": {"length_mm": 600, "width_mm": 600, "pitch_x_mm": 5, "pitch_y_mm": 5, "row_mm": 4,
                          "column_mm": 4}}, "120 x 120 crossings; expected at most 10000"),
         ({"cell": {"shape": "trj"}}, "unknown shape 'trj'"),
-        ({"cell": {"shape": "array"}}, "unknown shape 'array'"),
+        ({"cell": {"shape": "array"}}, "cell.shape: array; expected the shape of one crossing"),
         ({"cell": {"parameters": {"length_mm": 5}}}, "the array gives it"),
         ({"cell": {"shape": "tri", "parameters": {"period_mm": 3}}}, "column_mm 8 is 2.667 periods"),
         ({"cell": {"shape": "pillar", "parameters": {"period_mm": 2}}, "parameters": {"pitch_y_mm": 9}},

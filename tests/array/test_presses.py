@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from sensorgen.core import document
 from sensorgen.measure.virtual.array import nodal
 from sensorgen.prediction.array.frames import at_rest
 from sensorgen.prediction.array.readout import ArrayReadout
@@ -56,3 +57,11 @@ def test_fewer_are_told_apart_with_more_noise(model):
     assert far[0] < far[1] < far[2] == np.inf
     assert count(model, 12.5) == 30
     assert distance_mm(model, np.full(48, 1e-30)) == np.inf
+
+
+def test_what_is_not_told_apart_is_said_as_far_as_it_was_tried():
+    """Three rows have room for 10 mm around their middle; beyond, 'however far' was no answer."""
+    found = study(array_of({"length_mm": 70, "width_mm": 30}), ArrayReadout())
+    assert np.isinf(found.apart_mm)
+    words = " ".join("".join(document.text(found.document())).split())
+    assert "up to 10 mm apart: farther ones were not tried" in words

@@ -367,8 +367,9 @@ def test_unloaded_seconds_are_recognised_by_the_readings(days, all_days):
 
 
 def test_a_calibration_is_stored_whole(tmp_path, all_days, days):
-    (tmp_path / "c.npz").write_bytes(all_days.calibration.npz())
+    (tmp_path / "c.npz").write_bytes(replace(all_days.calibration, readout="two-terminal").npz())
     back = stored(tmp_path / "c.npz")
+    assert back.readout == "two-terminal"
     for one, other in zip(back.pressures(days[0]), all_days.calibration.pressures(days[0]), strict=True):
         assert np.array_equal(one, other, equal_nan=True)
     np.savez(tmp_path / "d.npz", a=1)

@@ -9,6 +9,7 @@ import pytest
 from sensorgen.asprinted import agreement
 from sensorgen.asprinted.beads import pieces, placed
 from sensorgen.core.errors import BadInput
+from sensorgen.design.design import make
 from sensorgen.export import slicing
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.slicing import Placed
@@ -115,3 +116,10 @@ def test_what_is_no_g_code_is_said(tmp_path):
     (tmp_path / "no.gcode").write_bytes(bytes(range(256)))
     with pytest.raises(BadInput, match="expected G-code"):
         _ = from_gcode(design, tmp_path / "no.gcode").cells
+
+
+def test_of_an_array_one_crossing_is_looked_for(tmp_path):
+    """The whole array was taken for a sensor, of which an electrode did not run from end to end."""
+    (tmp_path / "a.gcode").write_text("G1 X1\n")
+    array = make({"shape": "array", "name": "a", "cell": {"shape": "tri"}})
+    assert from_gcode(array, tmp_path / "a.gcode").design == array.crossing

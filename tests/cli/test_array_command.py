@@ -81,6 +81,7 @@ def test_build_writes_the_wires(run, file, tmp_path, monkeypatch):
         (("check", "array", "--pitch-x", "4mm", "--column", "4mm"), "leaves no space between columns"),
         (("invert", "a.yaml", "none.npz"), "none.npz"),
         (("invert", "a.yaml", "f.csv", "--perfect"), "--perfect is for lines"),
+        (("invert", "a.yaml", "f.csv", "--gcode", "none.gcode"), "none.gcode"),
         (("invert", "a.yaml", "f.csv"), "no frequency of the readings"),
         (("invert", "a.yaml", "g.csv"), "frequency_hz is 1 kHz to 10 kHz; expected one frequency in all frames"),
         (("invert", "a.yaml", "f.csv", "-o", "f.h5"), "--output f.h5: expected a name in .npz"),
@@ -108,6 +109,9 @@ def test_build_writes_each_tile(run, tmp_path, monkeypatch):
     for row in rows:
         files = {path.name for path in (tmp_path / "out" / row["design"]).iterdir()}
         assert {"wires.csv", f"{row['design']}.prusa.3mf", f"{row['design']}.html"} <= files
+    words = " ".join(run("array", "strip.yaml").out.split())
+    assert "2 columns, 12 crossings" in words
+    assert "2 tiles are printed, of 10 wires together" in words  # 8 wires are of the one print that is not made
 
 
 def test_the_shape_has_options_like_others(run):

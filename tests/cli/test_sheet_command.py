@@ -116,7 +116,7 @@ def test_maps_are_drawn(run, tmp_path):
         (["--pad=-5-10,0-10"], "expected X0-X1,Y0-Y1"),
         (["--pad", "10-0,0-10"], "give the lower first"),
         (["--pad", "0,0"], "without length"),
-        (["--pad", "55-65,0-10"], "beyond the sheet"),
+        (["--pad", "55-65,0-10"], "x 55..65, y 0..10 mm reaches from x = 55 to 65 mm, beyond the sheet's 0 to 60 mm"),
         (["--pad", "0-10,0-10", "--pad", "5-15,0-10"], "shorted"),
     ],
 )

@@ -11,6 +11,16 @@ def test_it_prints_tables(run):
     for word in ("lower film alone", "difference alone", "0.3 mm", "bare", "top driven", "bridge", "doubt:"):
         assert word in said.out
     assert max(map(len, said.out.splitlines())) <= 80
+    row = next(line for line in said.out.splitlines() if line.strip().startswith("1.1 kHz"))
+    assert row.split()[-2:] == ["0", "0"]  # of films that are alike, not 3.4e-13
+
+
+@pytest.mark.parametrize("command", ["stack", "sheet"])
+def test_an_array_is_no_sensor_of_one_pair_of_electrodes(run, command):
+    """One crossing was taken for it, without a word."""
+    found = run(command, "array")
+    assert (found.code, found.out) == (2, "")
+    assert "is an array; expected" in found.line
 
 
 @pytest.mark.parametrize(

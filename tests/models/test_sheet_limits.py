@@ -77,7 +77,7 @@ def test_very_unequal_sheets(ratio):
         ([(PORT[0], FILM.edge("top", "front"))], "shorted"),
         ([PORT, (Contact("top", (0.0, 0.02), (0.01, 0.02)), PORT[1])], "shorted"),
         ([(PORT[0], Contact("bottom", (0.09, 0.11), (0.0, 0.01)))], "beyond the sheet"),
-        ([(PORT[0], Contact("bottom", (0.0, 0.01), (-0.01, 0.01)))], r"y = -0\.01 to 0\.01"),
+        ([(PORT[0], Contact("bottom", (0.0, 0.01), (-0.01, 0.01)))], "y = -10 to 10 mm"),
     ],
 )
 def test_contacts_that_make_no_sense(ports, words):

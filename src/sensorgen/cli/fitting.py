@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from sensorgen.measure.log import Log
 
 _OF_SPECIMENS = ("recordings", "again", "page", "source", "dry_run", "tip", "force_offset", "file")
-_OF_ARRAYS = ("array", "calibration", "by_first", "frequency_hz")
+_OF_ARRAYS = ("array", "calibration", "by_first", "frequency_hz", "readout", "input_ohm")
 Recordings = Annotated[tuple[int, ...], Option(kind=click.IntRange(1))]
 
 

@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sensorgen.cli import render
-from sensorgen.cli.options import ArrayFrames, refuse_input, refuse_typed
+from sensorgen.cli.options import ArrayFrames, InputResistance, Readout, refuse_input, refuse_typed
 from sensorgen.core import files as store
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.options import Argument, Option
 
 if TYPE_CHECKING:
+    from sensorgen.cli.designs import BodyChoice
     from sensorgen.core.arrays import Real
     from sensorgen.core.document import Documented
     from sensorgen.design.design import Design
@@ -120,12 +121,13 @@ class Task:
             render.say(self.output or "--output FILE.csv writes force and position of every sample")
 
 
+_OF_FRAMES = ("frequency_hz", "readout", "input_ohm")
 _OF_LINES = ("perfect", "law", "prior", "force_limit_n", "newest")
 _OF_DESIGNS = ("rest_file", "noise", "prior", "newest", "force_limit_n")
 
 
-def invert(design: "Design", task: Task, frames: ArrayFrames) -> int:
-    """Pressure maps of an array's frames."""
+def invert(design: "Design", task: Task, frames: ArrayFrames, body: "BodyChoice") -> int:
+    """Pressure maps of an array's frames, by a body of one crossing."""
     from sensorgen.measure.array_frames import read
     from sensorgen.prediction.array.frames import inverted
     from sensorgen.prediction.array.model import array_model
@@ -136,7 +138,7 @@ def invert(design: "Design", task: Task, frames: ArrayFrames) -> int:
         raise BadInput(f"--output {task.output}: expected a name in .npz (maps) or .csv (a row for each frame)")
     refuse_typed(_OF_LINES, "is for lines; an array is inverted with --readout, --input, --noise and --scatter")
     refuse_input(frames.readout)
-    model = array_model(design)
+    model = array_model(design, body=body(design.crossing))
     shape = (model.here.shape[0], model.here.shape[1])
     read_in = read(Path(task.measured), shape, frames.frequency_hz)
     apart = read(Path(task.rest_file), shape, read_in.frequency_hz).at_rest() if task.rest_file else None
@@ -204,6 +206,8 @@ class ArrayOptions:
 
     array: Path | None = None
     frequency_hz: float | None = None
+    readout: Readout = "guarded"
+    input_ohm: InputResistance = 50.0
     calibration: Path | None = None
     by_first: bool = False
 
@@ -222,18 +226,21 @@ def calibrate(files: Sequence[str], how: ArrayOptions) -> int:
     from sensorgen.measure.array_frames import of_frames, session
     from sensorgen.prediction.array.sessions import study
 
+    readout = ""
     if how.array is None:
-        if how.frequency_hz is not None:
-            raise BadInput("--frequency is of an array's frames; expected --array DESIGN.yaml beside it")
+        refuse_typed(_OF_FRAMES, "is of an array's frames; expected --array DESIGN.yaml beside it")
         sessions = [session(Path(file), k) for k, file in enumerate(files)]
     else:
         from sensorgen.design.design import load
         from sensorgen.prediction.array.model import array_model
 
-        sessions = of_frames([Path(file) for file in files], array_model(load(how.array)), how.frequency_hz)
+        refuse_input(readout := how.readout)
+        model = array_model(load(how.array))
+        recorded = [Path(file) for file in files]
+        sessions = of_frames(recorded, model, how.frequency_hz, readout, how.input_ohm)  # type: ignore[arg-type]
     studied = study(sessions, by_first=how.by_first)
     if how.calibration is not None:
-        store.replace(how.calibration, studied.calibration.npz())
+        store.replace(how.calibration, replace(studied.calibration, readout=readout).npz())
     render.deliver(studied)
     if how.calibration is not None:
         render.say(how.calibration, err=bool(render.form()))

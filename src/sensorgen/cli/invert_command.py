@@ -178,7 +178,7 @@ def _of_design(
     if design.layout:
         from sensorgen.cli import inversion
 
-        return inversion.invert(design, task, frames)
+        return inversion.invert(design, task, frames, body)
     if frames.calibration:
         raise BadInput(f"--calibration is of an array; {design.name} is {design.shape}: invert its specimen by name")
     from sensorgen.prediction.query import Query

@@ -27,6 +27,12 @@ if TYPE_CHECKING:
 Drift = Annotated[float, Option(kind="proper share", typed="10%")]
 
 
+def _refuse_array(design: "Design") -> None:
+    """Refuse an array, of which one crossing would be taken for the sensor."""
+    if design.layout:
+        raise BadInput(f"{design.name} is an array; expected a sensor of one top electrode, or 'sensorgen array'")
+
+
 @of_design("stack", *render.options())
 def stack_command(
     design: "Design", *, force_n: Force, position_mm: Annotated[float | None, Option(zero=True)] = None,
@@ -48,6 +54,7 @@ def stack_command(
     """
     from sensorgen.prediction.double_layer import study
 
+    _refuse_array(design)
     position_m = None if position_mm is None else position_mm * units.M_PER_MM
     return study(design, frequency_hz, force_n, position_m, noise, drift, within_n, law, tip_mm * units.M_PER_MM)
 
@@ -80,6 +87,7 @@ def sheet_command(
     from sensorgen.prediction.sensor_model import sensor_model
     from sensorgen.prediction.sheet_study import PLACES, study
 
+    _refuse_array(design)
     model = sensor_model(body(design), Query(law=law))[0]
     wanted, places = contacts or ("" if pads else "all"), PLACES**2
     names = [*(["pads"] if pads else []), *(name for name in SETS if wanted in (name, "all"))]
@@ -138,7 +146,7 @@ def array_command(
         raise BadInput(f"--simulate {simulate}: expected a name that ends in .npz")
     how = ArrayReadout(readout, input_ohm, frequency_hz, noise, noise_s or 0.0)  # type: ignore[arg-type]
     model = array_model(design)
-    resolution = study(model, how, pressure_kpa, faults, short or 0.0)
+    resolution = replace(study(model, how, pressure_kpa, faults, short or 0.0), notes=_tiled(design))
     if simulate is not None:
         from sensorgen.measure.virtual.array import step
 
@@ -149,6 +157,23 @@ def array_command(
         render.file(plot / f"{design.name}-array.png", static.png(array.resolution(resolution)), "wrote ")
         render.file(plot / f"{design.name}-array.html", array.page(resolution, *_foot(model, how)), "wrote ")
     return resolution
+
+
+def _tiled(design: "Design") -> tuple[str, ...]:
+    """That an array is not printed as the one print that its numbers are of, if so."""
+    from sensorgen.workflows.tiles import tiles
+
+    try:
+        placed = tiles(design)
+    except BadInput as error:
+        return (f"not printable: {error}",)
+    if not placed:
+        return ()
+    first, wires = placed[0][0].design, sum(tile.rows + tile.columns for tile, _ in placed)
+    return (
+        f"larger than the bed: {len(placed)} tiles are printed, of {wires} wires together; the numbers are of one "
+        f"print (of a tile: sensorgen array out/{first}/design.json)",
+    )
 
 
 def _foot(model: "ArrayModel", readout: "ArrayReadout") -> "tuple[PressureMaps, Real]":

@@ -662,6 +662,8 @@ def _refuse_cell(design: Design) -> None:
     for key in ("cell", "regions"):
         if getattr(design, key) and design.shape != ARRAY:
             raise BadInput(f"{key}: {design.shape} has no crossings; expected shape: {ARRAY}")
+    if design.cell and design.cell.shape == ARRAY:
+        raise BadInput(f"cell.shape: {ARRAY}; expected the shape of one crossing, as tri or reference")
 
 
 def _one_source_each(design: Design) -> None:

@@ -412,7 +412,7 @@ class _OwnFiles:
         """Keys of a design's data whose files are taken over, each with the names of these files in place of paths."""
         yield from self.shape_and_machine(data)
         cell, materials, bodies = (data.get(key) for key in ("cell", "materials", "bodies"))
-        if isinstance(cell, dict) and isinstance(cell.get("shape"), str):
+        if isinstance(cell, dict) and isinstance(cell.get("shape"), str) and cell["shape"] != "array":  # no file
             yield "cell", cell | {"shape": self.add("shapes", cell["shape"])}
         if isinstance(materials, dict):
             yield "materials", {part: self.slot(word) for part, word in slots(materials).items()}

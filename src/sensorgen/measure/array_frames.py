@@ -26,6 +26,7 @@ from sensorgen.prediction.array.elements import ArraySession
 from sensorgen.prediction.array.frames import at_rest, missing
 from sensorgen.prediction.array.model import ArrayModel
 from sensorgen.prediction.array.readout import ArrayReadout
+from sensorgen.solvers.tracks import Readout
 
 MOST_BYTES = 4_000_000_000
 _TIME = re.compile(r"(t|time|timestamp)[ _(\[]*(s|ms|us|ns|min|h)?[)\]]?", re.IGNORECASE)
@@ -305,7 +306,10 @@ def session(
         return _session(path.stem, data, values, names, (number, area_mm2))
 
 
-def of_frames(paths: Sequence[Path], model: ArrayModel, frequency_hz: "float | None" = None) -> list[ArraySession]:
+def of_frames(
+    paths: Sequence[Path], model: ArrayModel, frequency_hz: "float | None" = None, readout: Readout = "guarded",
+    input_ohm: float = 50.0,
+) -> list[ArraySession]:  # fmt: skip
     """Sessions of frames of an array with a design: C/C0 - 1 of its crossings, by the network where that counts.
 
     Raises
@@ -317,7 +321,8 @@ def of_frames(paths: Sequence[Path], model: ArrayModel, frequency_hz: "float | N
     names, found = [f"r{i + 1}c{j + 1}" for i, j in np.ndindex(m, n)], []
     for k, path in enumerate(paths):
         frames = read(path, (m, n), frequency_hz)
-        inverter = at_rest(model, ArrayReadout(frequency_hz=(frames.frequency_hz,)), frames.siemens[frames.rest])
+        how = ArrayReadout(readout, input_ohm, (frames.frequency_hz,))
+        inverter = at_rest(model, how, frames.siemens[frames.rest])
         ratio, _, _ = inverter.planned(missing(frames.siemens))
         ratio = np.where(inverter.own, ratio, np.nan).reshape(len(ratio), -1)
         one = session(path, k, area_mm2=model.pitch_area_m2 * 1e6, values=ratio - 1, names=names)

@@ -176,7 +176,7 @@ def _sliced_cells(printed: "Callable[[], Printed]", source: str) -> Cells:
 
 
 def from_gcode(design: Design, file: str | Path) -> Body:
-    """The body by a file of G-code that somebody has sliced.
+    """The body by a file of G-code that somebody has sliced; of an array that of one crossing.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def from_gcode(design: Design, file: str | Path) -> Body:
     BadInput
         No such file; when the cells are needed, as :func:`sensorgen.asprinted.beads.placed`.
     """
-    path = Path(file)
+    path, design = Path(file), _one(design)
     with reading(path):
         content = path.read_bytes()
     return sliced(design, partial(registered, design, path), path.name, content + _of_another(design, path).encode())

@@ -141,7 +141,12 @@ def press_at(stacks: Stacked, force_n: float, position_m: float | None) -> Press
     return Press(force_n, max(left, 0.0), stacks.tip_m)
 
 
-_ROUNDING = 1e-12  # relative difference of two slopes below which it is rounding
+_ROUNDING = 1e-12  # relative difference of two readings or slopes below which it is rounding
+
+
+def _difference(one: float, other: float) -> float:
+    """Difference of two readings, without that of rounding [ohm]."""
+    return 0.0 if abs(one - other) < _ROUNDING * (abs(one) + abs(other)) else one - other
 
 
 @dataclass(frozen=True)
@@ -421,8 +426,8 @@ class StackStudy:
     def _readings(self) -> Table:
         heads = ("lower R", "lower X", "upper R", "upper X", "delta R", "delta X")
         readings = (
-            (r.frequency_hz, r.lower_re, r.lower_im, r.upper_re, r.upper_im, r.upper_re - r.lower_re,
-             r.upper_im - r.lower_im)
+            (r.frequency_hz, r.lower_re, r.lower_im, r.upper_re, r.upper_im, _difference(r.upper_re, r.lower_re),
+             _difference(r.upper_im, r.lower_im))
             for r in self.readings_ohm
         )  # fmt: skip
         columns = (Column("frequency", "Hz", si=True), *(Column(head) for head in heads))

@@ -226,8 +226,12 @@ def _prism(outline: Outline, bottom_mm: float, top_mm: float) -> Prism:
 
 
 def outlines(region: Region) -> Iterator[Outline]:
-    """Outlines without holes that together are a region: rectangles where all its edges run along the axes."""
-    for part in parts(region):
+    """Outlines without holes that together are a region: rectangles where all its edges run along the axes.
+
+    With holes its corners are rounded first: edges that a rounding error parts would be cut apart.
+    """
+    has_holes = any(part.interiors for part in parts(region))
+    for part in parts(shapely.set_precision(region, SLIVER_MM) if has_holes else region):
         x0, y0, x1, y1 = part.bounds
         is_box = are_boxes([part])[0]
         at = None if is_box else _cut_at(part)

@@ -63,6 +63,10 @@ class PressureMaps:
         That gave the pressures; its errors are in the standard errors.
     faults : tuple of str
         Breaks and shorts that the readings at rest show, as in :func:`readout.faulty`.
+    noise : (k, m, n) array
+        Part of each standard error that noise is [-].
+    correlation : (m n, m n) array or None
+        Of errors by noise between crossings, 0 of each with itself; none where each is by its own reading [-].
     """
 
     model: ArrayModel
@@ -72,6 +76,8 @@ class PressureMaps:
     sigma_kpa: Real
     calibration: "ArrayCalibration | None" = None
     faults: tuple[str, ...] = ()
+    noise: "Real | float" = 1.0
+    correlation: "Real | None" = None
 
     def _copied(self) -> tuple[Real, Real]:
         """Pressures and standard errors, a row for each frame."""
@@ -122,11 +128,22 @@ class PressureMaps:
         per_kpa = PA_PER_KPA * self.model.pitch_area_m2
         return per_kpa * self.filled[0], per_kpa * self.filled[1]
 
+    def _summed(self, sigma: Real) -> Real:
+        """Standard error of a sum over crossings by those of its terms, with their signs, (k, m, n).
+
+        What a calibration leaves is no noise: there correlations make no error less.
+        """
+        square = (sigma**2).sum((1, 2))
+        if self.correlation is not None:
+            noise = np.where(np.isfinite(self.pressure_kpa), self.noise * sigma, 0.0).reshape(len(sigma), -1)
+            square += np.maximum(((noise @ self.correlation) * noise).sum(1), 0.0 if self.calibration else -square)
+        return np.asarray(np.sqrt(square))
+
     @cached_property
     def force_n(self) -> tuple[Real, Real]:
         """Total force of each frame and its standard error, lost crossings filled; nan without any [N]."""
         (newtons, sigma), read = self._newtons, np.isfinite(self.pressure_kpa).any((1, 2))
-        force, error = np.nansum(newtons, (1, 2)), np.sqrt(np.nansum(sigma**2, (1, 2)))
+        force, error = np.nansum(newtons, (1, 2)), self._summed(np.nan_to_num(sigma))
         if self.calibration:
             error = np.hypot(error, self.calibration.common * force)
         return np.where(read, force, np.nan), np.where(read, error, np.nan)
@@ -140,21 +157,25 @@ class PressureMaps:
     def centre_mm(self) -> tuple[Real, Real, Real, Real]:
         """Centre of pressure from the print's corner along x and y, and standard errors; nan of no contact [mm].
 
-        Of crossings whose 5 x 5 together are above three standard errors: light loads count beside each other; farther
-        off there is noise, with a long arm. Lost crossings are filled.
+        Of crossings that are above three standard errors, alone or 5 x 5 together: light loads count beside each other;
+        farther off there is noise, with a long arm. Lost crossings are filled. The load of each row or column is as
+        likely anywhere across it.
         """
         from scipy import ndimage
 
         newtons, sigma = (np.nan_to_num(of) for of in self._newtons)
         of, errors = (ndimage.uniform_filter(each, (1, 5, 5), mode="constant") for each in (newtons, sigma**2))
-        near = of > DETECTED / 5 * np.sqrt(np.maximum(errors, 0.0))
+        near = (of > DETECTED / 5 * np.sqrt(np.maximum(errors, 0.0))) | self.touched
         weight, found = np.where(near, newtons, 0.0), list[Real]()
-        total = np.where(self.touched.any((1, 2)), weight.sum((1, 2)), np.nan)
+        total = weight.sum((1, 2))
+        total = np.where(self.touched.any((1, 2)) & (total > 0), total, np.nan)
         with np.errstate(invalid="ignore", divide="ignore"):
             for axis, at in ((1, self.model.layout.x_mm), (2, self.model.layout.y_mm)):
-                found.append((weight.sum(axis) @ at) / total)
-                arms = np.array(at) - found[-1][:, None]
-                found.append(np.sqrt(((near * sigma**2).sum(axis) * arms**2).sum(1)) / total)
+                line = weight.sum(axis)
+                found.append((line @ at) / total)
+                arms = np.expand_dims(np.array(at) - found[-1][:, None], axis)
+                across = self.model.layout.params.pitch[axis - 1] * np.sqrt((line**2).sum(1) / 12)
+                found.append(np.hypot(self._summed(near * sigma * np.nan_to_num(arms)), across) / total)
         return found[0], found[2], found[1], found[3]
 
     @property
@@ -536,6 +557,16 @@ class MapInverter:
         variance = self.gain[1].reshape(self.model.here.shape)
         return np.asarray(np.sqrt(variance) / np.where(self.model.here, self.rest_f, 1.0))
 
+    @cached_property
+    def correlation(self) -> "Real | None":
+        """Of errors of capacitances by noise, (m n, m n), 0 of each with itself; none of large arrays [-]."""
+        gain, variance = self.gain
+        if gain.shape[0] == 2:
+            return None
+        found = gain @ gain.T / np.sqrt(np.outer(variance, variance))
+        np.fill_diagonal(found, 0.0)
+        return np.asarray(found)
+
     def _compared(self, siemens: Complex, ratio: Real) -> float:
         """Largest difference of C/C0 from the network in a frame, in standard errors."""
         network = self.by_network(siemens[None])[0]
@@ -569,17 +600,23 @@ class MapInverter:
         plan: "MapPlan | None" = None, past: "Past | None" = None,
     ) -> PressureMaps:  # fmt: skip
         """Pressure maps of frames, by the law of the cell, or of each element where they are calibrated."""
+        plan = plan or MapPlan()
         ratio, error, by = self.planned(siemens, plan)
         pressure, per = self.model.pressures(np.nan_to_num(ratio, nan=1.0, posinf=1.0, neginf=1.0))
         noise = error * per * np.sqrt(1 + 1 / self.rest_count)
         sigma = np.hypot(noise, self.scatter * pressure)
         given = _known(sigma) & self.own & np.isfinite(ratio) & self._same_sign(siemens)
         if calibration:
+            if calibration.readout not in ("", self.readout.kind):
+                raise BadInput(f"a calibration of {calibration.readout} frames; expected no {self.readout.kind} ones")
             by += f"; {calibration.law.form.words()} of each element, calibrated"
             mean, half = calibration.of_ratio(ratio, time_s, calibration.counted(day), past)
             pressure, sigma = PA_PER_KPA * mean, PA_PER_KPA / NORMAL_90 * half
         shown, error_kpa = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
-        return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration, self.faults)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.nan_to_num(np.minimum(noise / sigma, 1.0))
+        correlation = self.correlation if plan.network else None
+        return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration, self.faults, share, correlation)
 
 
 @dataclass(frozen=True, eq=False)

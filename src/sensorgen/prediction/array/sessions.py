@@ -51,6 +51,8 @@ class ArrayCalibration:
         Standard deviation of an unloaded reading.
     names : tuple of str
         Of the elements; none where they are numbered.
+    readout : str
+        By which the frames of an array were read; "" of elements by themselves.
     """
 
     law: elements.ElementLaw
@@ -61,6 +63,7 @@ class ArrayCalibration:
     tares: Real
     quiet: Real
     names: tuple[str, ...] = ()
+    readout: str = ""
 
     def pressures(self, session: elements.ArraySession, tare: "Real | None" = None) -> tuple[Real, Real]:
         """Pressures, and half-widths of their intervals, (k, n); nan of dead elements and missing readings [kPa]."""
@@ -141,7 +144,7 @@ class ArrayCalibration:
         np.savez_compressed(
             target, form=np.array(form, float), scale=law.scale, at=law.at, spread=law.spread, alive=law.alive,
             numbers=np.array([law.day, law.drift, law.unsure, *error]), tares=self.tares,
-            quiet=self.quiet, names=np.array(self.names, str),
+            quiet=self.quiet, names=np.array(self.names, str), readout=np.array(self.readout),
         )  # fmt: skip
         return target.getvalue()
 
@@ -163,7 +166,8 @@ def stored(path: Path) -> ArrayCalibration:
                 data["spread"], day, rate, unsure, data["alive"],
             )  # fmt: skip
             names = tuple(data["names"].tolist()) if "names" in data else ()
-            return ArrayCalibration(law, floor, share, reach, common, data["tares"], data["quiet"], names)
+            readout = str(data["readout"]) if "readout" in data else ""
+            return ArrayCalibration(law, floor, share, reach, common, data["tares"], data["quiet"], names, readout)
     except (KeyError, TypeError, ValueError, EOFError, BadZipFile):
         raise BadInput(f"{path}: no calibration of an array; expected a file of 'calibrate --calibration'") from None
 

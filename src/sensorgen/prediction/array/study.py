@@ -37,7 +37,7 @@ def pressures(model: ArrayModel, presses: Real) -> Real:
 
 
 def distance_mm(model: ArrayModel, information: Real) -> float:
-    """Distance from which two equal presses are seen as two, wherever they lie; infinite if none of six pitches does.
+    """Distance from which two equal presses are seen as two, wherever they lie; infinite if none that is tried does.
 
     Presses of unknown force and place, along rows and along columns: the difference of their places is above
     ``APART`` standard errors, by the Cramer-Rao bound with priors of a press's own force and of the array's size.
@@ -51,12 +51,17 @@ def distance_mm(model: ArrayModel, information: Real) -> float:
 
     matrix = diags_array(information) if information.ndim == 1 else information
     step = max(model.layout.params.pitch) / _PER_PITCH
-    most = _PER_PITCH * max(1, min(_MOST, min(model.here.any(1).sum(), model.here.any(0).sum()) - 2))
+    most = _PER_PITCH * _pitches(model)
     for k in range(most, 0, -1):
         ways = product((0, 1), _PHASES, _PHASES)
         if not all(_are_apart(model, matrix, k * step, *way) for way in ways):
             return (k + 1) * step if k < most else float("inf")
     return step
+
+
+def _pitches(model: ArrayModel) -> int:
+    """Pitches up to which presses are tried: beyond, one of them may lie off the array."""
+    return max(1, min(_MOST, int(min(model.here.any(1).sum(), model.here.any(0).sum())) - 2))
 
 
 def _are_apart(model: ArrayModel, information: Real, distance: float, axis: int, dx: float, dy: float) -> bool:
@@ -108,6 +113,8 @@ class ArrayStudy:
         Distance from which two presses are seen as two; infinite of none [mm].
     short : float
         Probability that a crossing is shorted, P(short) of its print [-].
+    notes : tuple of str
+        What is said of its print.
     """
 
     model: ArrayModel
@@ -118,6 +125,7 @@ class ArrayStudy:
     faults: tuple[str, ...] = ()
     apart_mm: float = np.inf
     short: float = 0.0
+    notes: tuple[str, ...] = ()
 
     @property
     def determined(self) -> Mask:
@@ -194,7 +202,7 @@ class ArrayStudy:
 
     def document(self) -> Iterator[Part]:
         """Cell, tracks, readout, and a table of what is resolved."""
-        yield Facts(tuple(self._facts()))
+        yield Facts((*self._facts(), *(("print", note) for note in self.notes)))
         yield ""
         sigma, force = (each[self.model.here & self.determined] for each in (self.sigma_kpa, self.sigma_n))
         if not sigma.size:
@@ -218,7 +226,8 @@ class ArrayStudy:
             f"two presses {press} are seen as two from {self.apart_mm:.3g} mm on, wherever they lie: "
             f"{count(self.model, self.apart_mm)} at once"
             if np.isfinite(self.apart_mm)
-            else f"two presses {press} are not seen as two at every place, however far"
+            else f"two presses {press} are not seen as two at every place up to "
+            f"{_pitches(self.model) * max(self.model.layout.params.pitch):.3g} mm apart: farther ones were not tried"
         )
         yield from self.model.shared()
         yield from self.model.beyond(np.array([self.pressure_kpa]))
@@ -251,6 +260,7 @@ class ArrayStudy:
             "apart_mm": self.apart_mm if np.isfinite(self.apart_mm) else None,
             "frames_per_s": 1 / self.readout.frame_s(self.model),
             "faults": self.faults,
+            "notes": self.notes,
             "yield": self.whole if self.short else None,
         }
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
+from sensorgen.core.units import M_PER_MM
 
 SIDES = ("top", "bottom")
 EDGES = ("left", "right", "front", "back")
@@ -107,12 +108,14 @@ class Contact:
             raise UnknownName("side of a contact", self.side, SIDES)
         for start, stop in (self.x_m, self.y_m):
             if not start <= stop:  # also NaN
-                raise OutOfRange(f"a contact starts at {start:g} m and stops at {stop:g} m: give the lower first")
+                ends = f"{start / M_PER_MM:g} mm and stops at {stop / M_PER_MM:g} mm"
+                raise OutOfRange(f"a contact starts at {ends}: give the lower first")
         if self.x_m[0] == self.x_m[1] and self.y_m[0] == self.y_m[1]:
             raise OutOfRange("a contact without length: the resistance to a point is infinite, give it a size")
 
     def __str__(self) -> str:
-        return "{} contact at x {:g}..{:g}, y {:g}..{:g} m".format(self.side, *self.x_m, *self.y_m)
+        ends = (f"{at / M_PER_MM:g}" for at in (*self.x_m, *self.y_m))
+        return "{} contact at x {}..{}, y {}..{} mm".format(self.side, *ends)
 
     def touches(self, other: "Contact") -> bool:
         """Test whether the two are connected through a common place of one sheet."""
@@ -190,7 +193,8 @@ def _check_inside(what: str, sheet: Sheet, x_m: tuple[float, float], y_m: tuple[
     for axis, (start, stop), size in (("x", x_m, sheet.length_m), ("y", y_m, sheet.width_m)):
         if start < -ROUNDING * size or stop > size * (1 + ROUNDING):
             raise OutOfRange(
-                f"{what} reaches from {axis} = {start:g} to {stop:g} m, beyond the sheet's 0 to {size:g} m"
+                f"{what} reaches from {axis} = {start / M_PER_MM:g} to {stop / M_PER_MM:g} mm, beyond the sheet's 0 to "
+                f"{size / M_PER_MM:g} mm"
             )
 
 
