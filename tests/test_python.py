@@ -152,12 +152,50 @@ def test_lists_of_designs():
         lambda: sg.predict(PLATE, force_n=[2.0, 1.0]), lambda: sg.predict(PLATE, noise=-1.0),
         lambda: sg.predict(PLATE, frequency_hz=0.0), lambda: sg.cell(PLATE, frequency_hz=-1.0),
         lambda: sg.invert(sg.Design(shape="array"), [1e4], [[1.0]], noise=1e-3),
-        lambda: sg.invert(PLATE, [1e4], [[1.0]]),
+        lambda: sg.invert(PLATE, [1e4], [[1.0]]), lambda: sg.invert(PLATE, [1e4], [[1.0]], rest_ohm=[1.1]),
+        lambda: sg.invert(PLATE, TONES_HZ, [TONES_HZ], rest_ohm=TONES_HZ, noise="much"),
+        lambda: sg.predict(PLATE, accuracy=0.0), lambda: sg.predict(PLATE, accuracy=-1.0),
+        lambda: sg.predict(PLATE, accuracy=np.nan), lambda: sg.predict(PLATE, accuracy="fine"),
+        lambda: sg.compress(PLATE, 10.0, accuracy=np.nan), lambda: sg.predict(PLATE, tip="5mm"),
+        lambda: sg.predict(PLATE, force_n="6 N"), lambda: sg.cell(PLATE, frequency_hz=[1e3, 1e4]),
+        lambda: sg.cell(PLATE, frequency_hz=0.0), lambda: sg.sweep(PLATE, dielectric_mm=[0.2], jobs=0),
+        lambda: sg.sweep(PLATE, dielectric_mm=[0.2], query=3), lambda: sg.check({"a": PLATE}),
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused(asked):
     with pytest.raises(SensorgenError, match="expected"):
         asked()
+
+
+def test_walls_that_are_none_are_refused_at_once():
+    with pytest.raises(SensorgenError, match="unknown walls 'foo'"):
+        sg.as_printed(PLATE, walls="foo")
+
+
+def test_a_value_that_is_no_list_is_named():
+    with pytest.raises(BadInput, match=r"dielectric_mm=0\.2; expected"):
+        sg.sweep(PLATE, dielectric_mm=0.2)
+
+
+def test_designs_of_any_kind_of_list():
+    several = [PLATE, sg.Design(shape="reference", parameters={"dielectric_mm": 0.4})]
+    wanted = sg.cell(several).to_json()
+    for kind in (np.array(several, dtype=object), iter(several), tuple(several)):
+        assert sg.cell(kind).to_json() == wanted
+
+
+def test_both_electrodes_are_named_at_once():
+    assert sg.Design(shape="reference", materials={"electrode": "filaflex-conductive"}).materials.bottom_electrode == (
+        "filaflex-conductive"
+    )
+
+
+def test_a_reading_without_an_end_leaves_the_others_as_they_are():
+    forces = [0.0, 4.0, 6.0]
+    z = sg.predict(PLATE, force_n=forces, position_mm=50).impedance.impedance_ohm[..., 0].T
+    alone = sg.invert(PLATE, TONES_HZ, z[1:], rest_ohm=z[:1])
+    beside = sg.invert(PLATE, TONES_HZ, [*z[1:], np.full(7, np.inf)], rest_ohm=z[:1])
+    assert beside.statuses() == [*alone.statuses(), "missing"]
 
 
 def test_a_softer_specimen_is_within_the_intervals_of_its_design():
