@@ -98,6 +98,8 @@ def test_tables_for_pandas(results):
     assert rest.loc["capacitance", "drawn"] == pytest.approx(8.8541878128e-12 * 4.68 * 1e-3 / 0.6e-3, rel=1e-4)
     assert rest.loc["capacitance", "printed_lower"] < rest.loc["capacitance", "printed"]
     assert rest.loc["top electrode", "unit"] == "ohm"
+    built = results["build"].to_pandas().set_index("quantity")
+    assert built.loc["capacitance", "drawn"] == rest.loc["capacitance", "drawn"]
     pressed, z = loaded.to_pandas(), loaded.impedance
     assert len(pressed) == len(z.force_n) * len(z.position_mm)
     assert pressed["im_ohm_1.1kHz"].iloc[-1] == pytest.approx(z.impedance_ohm[0, -1, -1].imag)
