@@ -319,15 +319,10 @@ def export_design(design: Design, path: str | Path, gcode: str | Path | None = N
     ...     [file.name for file in export_design(Design(shape="reference"), Path(folder) / "plate.3mf")]
     ['plate.3mf']
     """
-    from sensorgen.asprinted import printed as asprinted
-    from sensorgen.export.gcode import motion
     from sensorgen.workflows import export as exports
 
     design = _named(design)
-    content = None if gcode is None else Path(gcode).read_bytes()
-    printed = (
-        asprinted.body(design, motion.read(content, design.machine)) if content else reviewed(design).printed(design)
-    )
+    printed = reviewed(design).printed(design) if gcode is None else bodies.registered(design, Path(gcode))
     return exports.export(printed, Path(path))
 
 
