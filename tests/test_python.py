@@ -227,6 +227,13 @@ def test_a_design_is_pressed_by_its_own_tip():
     assert "tip 30 mm" in sg.predict(wide, force_n=6.0, position_mm=50.0).text()
 
 
+def test_a_resolution_is_called_that_of_a_perfect_model_where_no_other_is_known(tmp_path):
+    round_tip = sg.Design(shape="reference", parameters={"length_mm": 30.0}, tip={"shape": "hertz", "width_mm": 10.0})
+    for shape, known in ((round_tip, "of a perfect model"), (PLATE, "after 30 known presses")):
+        assert f"(resolution {known}, at 6 N" in sg.predict(shape).text()
+        assert f"(resolution {known}, at 6 N" in sg.build(shape, tmp_path, cad=False).text()
+
+
 def test_reports_of_nothing_are_refused(tmp_path):
     with sg.Log(tmp_path / "log.db", create=True) as log:
         log.add([reading("30 SX60 2", "1.2k", "OL")])

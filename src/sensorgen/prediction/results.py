@@ -420,7 +420,8 @@ class Prediction(Boundless, Displayed):
         rows = [(name, *(each.get(name) for each in words)) for name in words[-1]]
         columns = (Column(""), *(Column(p.body.partition(",")[0]) for p in shown))
         yield Table("quantities", "", columns, tuple(rows))
-        yield caption_of(self.force_n, self.position_m, self.body)
+        exact = self.force_resolution and not any(top.calibrated for top in self.under())
+        yield caption_of(self.force_n, self.position_m, self.body, exact=bool(exact))
         if self.tops:
             yield f"the worst of: {self.by_top()}"
         if self.narrowing:
@@ -563,9 +564,10 @@ class Overview(Prediction):
         yield f"(--details: causes of the ranges, impedance, error budget, {len(self.assumptions)} assumptions)"
 
 
-def caption_of(force_n: float, position_m: float, body: str) -> str:
+def caption_of(force_n: float, position_m: float, body: str, *, exact: bool) -> str:
     """For which press, after what calibration and of which body resolutions are stated."""
-    return f"(resolution after 30 known presses, at {force_n:g} N and {position_m * 1e3:g} mm; {body})"
+    known = "of a perfect model" if exact else "after 30 known presses"
+    return f"(resolution {known}, at {force_n:g} N and {position_m * 1e3:g} mm; {body})"
 
 
 def on_bench(exact: Bounds | None, calibrated: float | None) -> Bounds | None:
