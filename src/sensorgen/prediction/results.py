@@ -396,6 +396,11 @@ class Prediction(Boundless, Displayed):
         return "; ".join(top.words(*most) for top in self.tops)
 
     @property
+    def exact(self) -> bool:
+        """True where resolutions are known of a perfect model alone."""
+        return bool(self.force_resolution) and not any(top.calibrated for top in self.under())
+
+    @property
     def conditional(self) -> bool:
         """True where it rests on values that no source gives."""
         return any(value.source == ASSUMED for value in self.values)
@@ -420,8 +425,7 @@ class Prediction(Boundless, Displayed):
         rows = [(name, *(each.get(name) for each in words)) for name in words[-1]]
         columns = (Column(""), *(Column(p.body.partition(",")[0]) for p in shown))
         yield Table("quantities", "", columns, tuple(rows))
-        exact = self.force_resolution and not any(top.calibrated for top in self.under())
-        yield caption_of(self.force_n, self.position_m, self.body, exact=bool(exact))
+        yield caption_of(self.force_n, self.position_m, self.body, exact=self.exact)
         if self.tops:
             yield f"the worst of: {self.by_top()}"
         if self.narrowing:
