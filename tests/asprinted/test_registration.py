@@ -72,9 +72,7 @@ def test_a_body_is_exported_wherever_it_stands(made, tmp_path):
     design, done = made
     moved, empty = tmp_path / "moved.gcode", tmp_path / "empty.gcode"
     moved.write_text(changed(done.raw.read_text("utf-8"), lambda x, y: (x + 8.0, y)), "utf-8")
-    wanted, elsewhere = (
-        sg.export_design(design, tmp_path / f"{file.stem}.vtu", file)[0] for file in (done.raw, moved)
-    )
+    wanted, elsewhere = (sg.export_design(design, tmp_path / f"{file.stem}.vtu", file)[0] for file in (done.raw, moved))
     material = [meshio.read(file).cells_dict["hexahedron"] for file in (wanted, elsewhere)]
     assert len(material[1]) == pytest.approx(len(material[0]), rel=0.01)
     empty.write_text("")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange
-from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM, si
 from sensorgen.design import values as stated
 from sensorgen.design.body import Body, Cells
 from sensorgen.design.design import Design
@@ -193,6 +193,13 @@ def _largest(design: Design, taken: Sequence[MaterialValue], given: Sequence[Mat
     if not given or known == {"air"}:
         return LARGEST_TANGENT
     return _tangent(design, taken, [*given, *assumed])[0]
+
+
+def perfect_interfaces(design: Design) -> Iterator[str]:
+    """Doubt about a cell alone, where a source says the gap of the film's interfaces."""
+    for gap in _of_film(design, INTERFACE_GAP):
+        at = f"{si(gap.value, 'm')} ({gap.source})"
+        yield f"the film's interfaces are taken as perfect; predict takes their gap, {at}"
 
 
 def _of_film(design: Design, quantity: str) -> list[MaterialValue]:
