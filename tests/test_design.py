@@ -218,3 +218,9 @@ def test_a_film_of_another_material_than_the_dielectric_stays(film):
     assert again.materials == design.materials
     assert (again.materials.film, again.materials.isolation, again.id()) == (film, "ninjaflex", design.id())
     assert drawn(design).with_values({"x60": {"relative_permittivity": 3.0}}).design.materials == design.materials
+
+
+@pytest.mark.parametrize("name", [{}, {"name": "mine"}])
+def test_a_dielectric_of_a_design_in_python_fills_the_film_too(name):
+    given = {"shape": "tri", "materials": {"dielectric": "ninjaflex"}, "tools": {"ninjaflex": 2}}
+    assert design.Design(**given, **name).materials == make(given).materials

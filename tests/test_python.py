@@ -128,6 +128,15 @@ def test_wrong_names_are_refused_when_a_design_is_made(wrong, message):
         sg.Design(**wrong)
 
 
+@pytest.mark.parametrize(
+    "wrong", [{"tools": {"x60": 77}}, {"materials": {"dielectric": "etpu"}}, {"materials": {"dielectric": "x60@nix"}}]
+)
+def test_a_design_with_a_name_of_its_own_is_looked_at_as_any(wrong):
+    for named in ({}, {"name": "mine"}):
+        with pytest.raises(SensorgenError, match=r"no tool 77|etpu conducts|unknown source"):
+            sg.check(sg.Design(shape="tri", **wrong, **named))
+
+
 def test_a_design_shows_what_differs_from_the_defaults():
     design = sg.Design(shape="tri", parameters={"period_mm": 3}, quality="extrafine")
     assert repr(design) == "Design(shape='tri', parameters={'period_mm': 3.0}, quality='extrafine')"

@@ -123,7 +123,7 @@ class Design(Strict):
     def _constructed(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         """Errors of a design that is constructed in Python, in the words of a file's."""
         try:
-            design = handler(data)
+            design = handler(_one_dielectric(data) if isinstance(data, dict) else data)
         except ValidationError as error:
             for key in _parameters_of(data) & set(data if isinstance(data, Mapping) else ()):
                 raise BadInput(f"{key} is a parameter; expected parameters: {{{key}: {data[key]}}}") from None

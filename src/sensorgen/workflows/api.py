@@ -479,7 +479,10 @@ def _named(design: Design) -> Design:
     """A design as :func:`sensorgen.design.design.make` completes it, also where it was constructed by hand."""
     if not isinstance(design, Design):
         raise BadInput(f"{design!r:.60}: expected a Design or a Body, as Design(shape='tri') or load('mine.yaml')")
-    return design if design.name else designs.make(design.model_dump(exclude_defaults=True, mode="json"))
+    if design.name and (design.border or design.geometry):  # whose files were read
+        return design
+    made = designs.make(design.model_dump(exclude_defaults=True, mode="json"))
+    return design if made == design else made
 
 
 def _numbers(name: str, values: ArrayLike) -> tuple[float, ...]:
