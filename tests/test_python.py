@@ -249,12 +249,20 @@ def test_reports_of_nothing_are_refused(tmp_path):
         for asked in (
             lambda: sg.report(log, 30, path=tmp_path / "r.pdf"),
             lambda: sg.compare(log, 99),
+            lambda: sg.calibrate(log),
             lambda: sg.fit(log, "30 SX60 2", iteration=30),
         ):
             with pytest.raises(SensorgenError, match=r"unknown format|expected"):
                 asked()
         named = sg.report(log, None, "30 SX60 2", "30 sx60 2", path=tmp_path / "r.csv")
     assert (named.specimens, [path.name for path in tmp_path.glob("r.*")]) == (("30 SX60 2",), ["r.csv"])
+
+
+def test_coupons_on_other_tools_and_few_of_them(tmp_path):
+    tools = {"etpu": 1, "x60": 2}
+    planned = sg.characterise("diabase-h5", "etpu", "x60", tmp_path, tools=tools, count=3, name="few")
+    assert (planned.name, len(planned.coupons)) == ("few", 3)
+    assert 'tools: {"etpu": 1, "x60": 2}' in (planned.folder / "form.yaml").read_text("utf-8")
 
 
 def test_files_are_written(tmp_path):

@@ -343,14 +343,18 @@ def batch(plan: str | Path, out: str | Path = "out", *, gcode: bool = True, forc
     return make(Path(plan), Path(out), gcode=gcode, force=force)
 
 
-def characterise(printer: str, conductor: str, dielectric: str, out: str | Path = "out") -> "Planned":
+def characterise(
+    printer: str, conductor: str, dielectric: str, out: str | Path = "out", *, quality: str = "fine",
+    tools: Mapping[str, int] | None = None, **limits: Any,
+) -> "Planned":  # fmt: skip
     """Choose coupons that measure two materials on a printer, and write the files of their plate.
 
-    As :func:`sensorgen.workflows.characterise.plan`; the filled form is read by ``sensorgen characterise``.
+    As :func:`sensorgen.workflows.characterise.plan`, which takes ``name``, ``count`` and ``hours``; ``tools`` are
+    those of materials that the printer's file does not name. ``sensorgen characterise`` reads the filled form.
     """
     from sensorgen.workflows.characterise import Study, plan
 
-    return plan(Study.of(printer, (conductor, dielectric)), Path(out))
+    return plan(Study.of(printer, (conductor, dielectric), quality=quality, tools=tools), Path(out), **limits)
 
 
 def optimise(target: str | Path, out: str | Path = "out") -> "Optimised":
@@ -460,6 +464,8 @@ def calibrate(log: Log, *specimens: str, bench: Bench | None = None) -> list[Cal
     ``Calibration.inverter()`` then finds force and position. Parameters and errors as of
     :func:`sensorgen.analysis.calibration.calibrate`.
     """
+    if not specimens:
+        raise BadInput("calibrate() without specimens; expected their names, as '23 triX .2mm 1'")
     return [work.calibration for work in calibrations.calibrate(log, specimens, bench)]
 
 
