@@ -11,6 +11,7 @@ from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownNam
 from sensorgen.design import design, printer
 from sensorgen.design.design import make, name_of
 from sensorgen.design.shapes import reference
+from sensorgen.prediction.bodies import drawn
 from sensorgen.scene.scene import Envelope, Prism
 
 
@@ -206,3 +207,20 @@ def test_a_dielectric_fills_film_and_isolation_unless_they_are_given():
     materials = {"dielectric": "pla", "film": "x60"}
     made = make({"shape": "tri", "parameters": {"isolation_mm": 0.2}, "materials": materials}).materials
     assert (made.dielectric, made.film, made.isolation) == ("pla", "x60", "pla")
+
+
+@pytest.mark.parametrize("film", ["x60", "ninjaflex"])
+def test_a_film_of_another_material_than_the_dielectric_stays(film):
+    """Of the default, too, which the film of another dielectric has not unless it is given."""
+    slots = {"dielectric": "ninjaflex", "film": film}
+    design = make({"shape": "tri", "materials": slots, "tools": {"ninjaflex": 2}})
+    again = make(design.model_dump(exclude_defaults=True, mode="json"))
+    assert again.materials == design.materials
+    assert (again.materials.film, again.materials.isolation, again.id()) == (film, "ninjaflex", design.id())
+    assert drawn(design).with_values({"x60": {"relative_permittivity": 3.0}}).design.materials == design.materials
+
+
+@pytest.mark.parametrize("name", [{}, {"name": "mine"}])
+def test_a_dielectric_of_a_design_in_python_fills_the_film_too(name):
+    given = {"shape": "tri", "materials": {"dielectric": "ninjaflex"}, "tools": {"ninjaflex": 2}}
+    assert design.Design(**given, **name).materials == make(given).materials

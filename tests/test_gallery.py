@@ -79,7 +79,7 @@ def test_names_are_imported_when_they_are_used():
     code = "import sys, sensorgen; print(*sorted(m for m in sys.modules if m.startswith('sensorgen.')))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True)
     assert done.stdout.split() == ["sensorgen.core", "sensorgen.core.version"]
-    assert len(sg.__all__) == len([name for name in sg.__all__ if getattr(sg, name)]) == 24
+    assert len(sg.__all__) == len([name for name in sg.__all__ if getattr(sg, name)]) == 26
     with pytest.raises(AttributeError, match="no attribute 'predikt'"):
         sg.predikt  # noqa: B018
 

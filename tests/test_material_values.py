@@ -10,10 +10,14 @@ from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.design import make
 from sensorgen.design.values import permittivities
+from sensorgen.prediction import capacitance_answer, compression
 from sensorgen.prediction.bodies import drawn
+from sensorgen.prediction.capacitance_answer import CapacitanceQuestion
 from sensorgen.prediction.compression_law import elastic
 from sensorgen.prediction.double_layer import stacked
+from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.rest_state import electrode_resistance, rest_state
+from sensorgen.solvers.contact.boundary import BoundaryConditions
 
 
 def design(values, shape="reference", **rest):
@@ -35,6 +39,25 @@ def test_permittivity_scales_a_plate():
     states = (rest_state(drawn(design(v)), ranges=False) for v in ({}, {"x60": {"relative_permittivity": 2.34}}))
     plain, half = (state.answer.capacitance_f.lower for state in states)
     assert half == pytest.approx(plain / 2, rel=1e-12, abs=0)
+
+
+def test_the_gap_of_interfaces_lies_in_series_with_a_film():
+    """C = eps0 A / (d / eps + g) of plates, also where an electrode sinks in; between both limits in a cell."""
+    for g in (10e-6, -7e-6):
+        values = {"x60": {"relative_permittivity": 4.68, "interface_gap_m": g}}
+        state = rest_state(drawn(design(values)))
+        assert state.capacitance.value == pytest.approx(8.8541878128e-12 * 1e-3 / (0.6e-3 / 4.68 + g), rel=1e-9)
+        assert [v.value for v in state.values if v.quantity == "interface_gap_m"] == [g]
+        body, asked = drawn(design(values)), compression.PressQuestion((0.0, 10.0), BoundaryConditions())
+        for alone in (capacitance_answer.answer(body, CapacitanceQuestion()), compression.answer(body, asked)):
+            assert "predict takes their gap" in " ".join(alone.doubts)
+        cell, perfect = (rest_state(drawn(design(v, "tri"))).capacitance for v in (values, {}))
+        ends = sorted(perfect.value / (1 + g * by) for by in (perfect.value / 8.8541878128e-15, 4.68 / 0.2e-3))
+        assert cell.material.lower < ends[0] < cell.value < ends[1] < cell.material.upper
+        terms = {term.name: term for term in evaluate(drawn(design(values, "tri"))).budget.terms}
+        assert terms["interfaces"].changes.capacitance == pytest.approx(
+            (ends[1] - ends[0]) / (ends[0] + ends[1]), rel=1e-3
+        )
 
 
 def test_the_source_is_told_and_the_name_of_the_design_is_another():

@@ -98,6 +98,8 @@ def test_tables_for_pandas(results):
     assert rest.loc["capacitance", "drawn"] == pytest.approx(8.8541878128e-12 * 4.68 * 1e-3 / 0.6e-3, rel=1e-4)
     assert rest.loc["capacitance", "printed_lower"] < rest.loc["capacitance", "printed"]
     assert rest.loc["top electrode", "unit"] == "ohm"
+    built = results["build"].to_pandas().set_index("quantity")
+    assert built.loc["capacitance", "drawn"] == rest.loc["capacitance", "drawn"]
     pressed, z = loaded.to_pandas(), loaded.impedance
     assert len(pressed) == len(z.force_n) * len(z.position_mm)
     assert pressed["im_ohm_1.1kHz"].iloc[-1] == pytest.approx(z.impedance_ohm[0, -1, -1].imag)
@@ -126,6 +128,15 @@ def test_wrong_names_are_refused_when_a_design_is_made(wrong, message):
         sg.Design(**wrong)
 
 
+@pytest.mark.parametrize(
+    "wrong", [{"tools": {"x60": 77}}, {"materials": {"dielectric": "etpu"}}, {"materials": {"dielectric": "x60@nix"}}]
+)
+def test_a_design_with_a_name_of_its_own_is_looked_at_as_any(wrong):
+    for named in ({}, {"name": "mine"}):
+        with pytest.raises(SensorgenError, match=r"no tool 77|etpu conducts|unknown source"):
+            sg.check(sg.Design(shape="tri", **wrong, **named))
+
+
 def test_a_design_shows_what_differs_from_the_defaults():
     design = sg.Design(shape="tri", parameters={"period_mm": 3}, quality="extrafine")
     assert repr(design) == "Design(shape='tri', parameters={'period_mm': 3.0}, quality='extrafine')"
@@ -152,12 +163,50 @@ def test_lists_of_designs():
         lambda: sg.predict(PLATE, force_n=[2.0, 1.0]), lambda: sg.predict(PLATE, noise=-1.0),
         lambda: sg.predict(PLATE, frequency_hz=0.0), lambda: sg.cell(PLATE, frequency_hz=-1.0),
         lambda: sg.invert(sg.Design(shape="array"), [1e4], [[1.0]], noise=1e-3),
-        lambda: sg.invert(PLATE, [1e4], [[1.0]]),
+        lambda: sg.invert(PLATE, [1e4], [[1.0]]), lambda: sg.invert(PLATE, [1e4], [[1.0]], rest_ohm=[1.1]),
+        lambda: sg.invert(PLATE, TONES_HZ, [TONES_HZ], rest_ohm=TONES_HZ, noise="much"),
+        lambda: sg.predict(PLATE, accuracy=0.0), lambda: sg.predict(PLATE, accuracy=-1.0),
+        lambda: sg.predict(PLATE, accuracy=np.nan), lambda: sg.predict(PLATE, accuracy="fine"),
+        lambda: sg.compress(PLATE, 10.0, accuracy=np.nan), lambda: sg.predict(PLATE, tip="5mm"),
+        lambda: sg.predict(PLATE, force_n="6 N"), lambda: sg.cell(PLATE, frequency_hz=[1e3, 1e4]),
+        lambda: sg.cell(PLATE, frequency_hz=0.0), lambda: sg.sweep(PLATE, dielectric_mm=[0.2], jobs=0),
+        lambda: sg.sweep(PLATE, dielectric_mm=[0.2], query=3), lambda: sg.check({"a": PLATE}),
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused(asked):
     with pytest.raises(SensorgenError, match="expected"):
         asked()
+
+
+def test_walls_that_are_none_are_refused_at_once():
+    with pytest.raises(SensorgenError, match="unknown walls 'foo'"):
+        sg.as_printed(PLATE, walls="foo")
+
+
+def test_a_value_that_is_no_list_is_named():
+    with pytest.raises(BadInput, match=r"dielectric_mm=0\.2; expected"):
+        sg.sweep(PLATE, dielectric_mm=0.2)
+
+
+def test_designs_of_any_kind_of_list():
+    several = [PLATE, sg.Design(shape="reference", parameters={"dielectric_mm": 0.4})]
+    wanted = sg.cell(several).to_json()
+    for kind in (np.array(several, dtype=object), iter(several), tuple(several)):
+        assert sg.cell(kind).to_json() == wanted
+
+
+def test_both_electrodes_are_named_at_once():
+    assert sg.Design(shape="reference", materials={"electrode": "filaflex-conductive"}).materials.bottom_electrode == (
+        "filaflex-conductive"
+    )
+
+
+def test_a_reading_without_an_end_leaves_the_others_as_they_are():
+    forces = [0.0, 4.0, 6.0]
+    z = sg.predict(PLATE, force_n=forces, position_mm=50).impedance.impedance_ohm[..., 0].T
+    alone = sg.invert(PLATE, TONES_HZ, z[1:], rest_ohm=z[:1])
+    beside = sg.invert(PLATE, TONES_HZ, [*z[1:], np.full(7, np.inf)], rest_ohm=z[:1])
+    assert beside.statuses() == [*alone.statuses(), "missing"]
 
 
 def test_a_softer_specimen_is_within_the_intervals_of_its_design():
@@ -187,18 +236,33 @@ def test_a_design_is_pressed_by_its_own_tip():
     assert "tip 30 mm" in sg.predict(wide, force_n=6.0, position_mm=50.0).text()
 
 
+def test_a_resolution_is_called_that_of_a_perfect_model_where_no_other_is_known(tmp_path):
+    round_tip = sg.Design(shape="reference", parameters={"length_mm": 30.0}, tip={"shape": "hertz", "width_mm": 10.0})
+    for shape, known in ((round_tip, "of a perfect model"), (PLATE, "after 30 known presses")):
+        assert f"(resolution {known}, at 6 N" in sg.predict(shape).text()
+        assert f"(resolution {known}, at 6 N" in sg.build(shape, tmp_path, cad=False).text()
+
+
 def test_reports_of_nothing_are_refused(tmp_path):
     with sg.Log(tmp_path / "log.db", create=True) as log:
         log.add([reading("30 SX60 2", "1.2k", "OL")])
         for asked in (
             lambda: sg.report(log, 30, path=tmp_path / "r.pdf"),
             lambda: sg.compare(log, 99),
+            lambda: sg.calibrate(log),
             lambda: sg.fit(log, "30 SX60 2", iteration=30),
         ):
             with pytest.raises(SensorgenError, match=r"unknown format|expected"):
                 asked()
         named = sg.report(log, None, "30 SX60 2", "30 sx60 2", path=tmp_path / "r.csv")
     assert (named.specimens, [path.name for path in tmp_path.glob("r.*")]) == (("30 SX60 2",), ["r.csv"])
+
+
+def test_coupons_on_other_tools_and_few_of_them(tmp_path):
+    tools = {"etpu": 1, "x60": 2}
+    planned = sg.characterise("diabase-h5", "etpu", "x60", tmp_path, tools=tools, count=3, name="few")
+    assert (planned.name, len(planned.coupons)) == ("few", 3)
+    assert 'tools: {"etpu": 1, "x60": 2}' in (planned.folder / "form.yaml").read_text("utf-8")
 
 
 def test_files_are_written(tmp_path):

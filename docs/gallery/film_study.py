@@ -11,7 +11,7 @@ for film, p in zip(films, predictions, strict=True):
     print(
         f"{film:.1f} mm: gap {p.drawn.gap.value * 1e3:.1f} -> {p.gap.value * 1e3:.1f} mm, "
         f"C {p.drawn.capacitance.value * 1e12:.1f} -> {p.capacitance.value * 1e12:.1f} pF, "
-        f"force known to {p.drawn.force_resolution.value:.2g} -> {p.force_resolution.value:.2g} N"
+        f"force after 30 known presses to {p.drawn.resolved()[0]} -> {p.resolved()[0]}"
     )
 
 # %% [markdown]

@@ -28,7 +28,8 @@ prediction
 prediction.plot()
 
 # %% [markdown]
-# How well can it tell force and position from one reading?
+# How well can it tell force and position from one reading: after 30 known presses, and if it were exactly as predicted?
 
 # %%
+print(prediction.resolved())
 print(prediction.identifiability.verdict)

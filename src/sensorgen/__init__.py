@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from sensorgen.design.body import Body as Body
     from sensorgen.design.design import Design as Design
     from sensorgen.measure.log import Log as Log
+    from sensorgen.prediction.query import Query as Query
+    from sensorgen.prediction.query import Tip as Tip
     from sensorgen.prediction.results import Prediction as Prediction
     from sensorgen.workflows.api import as_printed as as_printed
     from sensorgen.workflows.api import batch as batch
@@ -54,6 +56,8 @@ _TYPES = {
     "Design": "design.design",
     "Log": "measure.log",
     "Prediction": "prediction.results",
+    "Query": "prediction.query",
+    "Tip": "prediction.query",
 }
 _FUNCTIONS = (
     "as_printed",

@@ -4,8 +4,10 @@ import math
 import re
 import shutil
 
+import meshio
 import pytest
 
+import sensorgen as sg
 from sensorgen.asprinted import agreement
 from sensorgen.asprinted.beads import pieces, placed
 from sensorgen.core.errors import BadInput
@@ -65,6 +67,18 @@ def test_it_is_found_wherever_it_stands(made, place, tmp_path):
     file = tmp_path / "elsewhere.gcode"
     file.write_text(changed(done.raw.read_text("utf-8"), place), "utf-8")
     assert capacitance_f(design, file) == pytest.approx(capacitance_f(design, done.raw), rel=2e-3, abs=0)
+
+
+def test_a_body_is_exported_wherever_it_stands(made, tmp_path):
+    design, done = made
+    moved, empty = tmp_path / "moved.gcode", tmp_path / "empty.gcode"
+    moved.write_text(changed(done.raw.read_text("utf-8"), lambda x, y: (x + 8.0, y)), "utf-8")
+    wanted, elsewhere = (sg.export_design(design, tmp_path / f"{file.stem}.vtu", file)[0] for file in (done.raw, moved))
+    material = [meshio.read(file).cells_dict["hexahedron"] for file in (wanted, elsewhere)]
+    assert len(material[1]) == pytest.approx(len(material[0]), rel=0.01)
+    empty.write_text("")
+    with pytest.raises(BadInput, match=r"empty\.gcode"):
+        sg.export_design(design, tmp_path / "none.3mf", empty)
 
 
 def test_each_of_a_plate_is_found(made, tmp_path):

@@ -190,3 +190,14 @@ def test_the_nearest_design_is_offered(plan, tmp_path):
     (tmp_path / "trix-d0.1.yaml").write_text("shape: tri\n")
     with pytest.raises(UnknownName, match=r"did you mean 'trix-d0.1.yaml'"):
         read(plan(HEAD + "  - {design: trix-d01.yaml}\n"))
+
+
+@pytest.mark.parametrize("layout", ["spacing_mm: 0", "spacing_mm: 0.87", "spacing_mm: 0, brim_mm: 0.4"])
+def test_specimens_that_would_print_as_one_are_refused(plan, layout):
+    with pytest.raises(BadInput, match=r"print as one; expected layout.spacing_mm of 0\.88 or more"):  # two lines
+        arranged(plan(HEAD + f"  - {{shape: tri, replicates: 2}}\nlayout: {{{layout}}}\n"))
+
+
+def test_specimens_two_lines_apart_or_alone_have_a_place(plan):
+    for word, layout in (("2", "spacing_mm: 0.88"), ("2", "spacing_mm: 0, brim_mm: 0.5"), ("1", "spacing_mm: 0")):
+        assert arranged(plan(HEAD + f"  - {{shape: tri, replicates: {word}}}\nlayout: {{{layout}}}\n")).plate

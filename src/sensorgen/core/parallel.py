@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
@@ -10,13 +11,15 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import starmap
 from pathlib import Path
+from threading import Lock
 from time import perf_counter, process_time
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from sensorgen.core.errors import BadInput, NotInstalled, SensorgenError, library
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor, Future
+    from concurrent.futures import Executor, Future, ProcessPoolExecutor
     from contextlib import AbstractContextManager
 
 _EXPECTED_CLUSTER = "expected a scheduler's address, as tls://10.0.0.5:8786, or its file"
@@ -29,6 +32,7 @@ _ENVIRONMENT = {
     "VECLIB_MAXIMUM_THREADS": "1", "PYTHONWARNINGS": "ignore",
 }  # fmt: skip
 _POLL_S, _CONNECT_S, _ALONE_S = 1.0, 10.0, 60.0
+_STARTING = Lock()
 _LIMIT_S = 1800.0  # of processor time for one work; the longest that we know takes a tenth
 _DIED = (
     "a process ended before its answer, as when the memory is full, or after half an hour with one: "
@@ -281,6 +285,8 @@ class Lane:
 class _Process(Lane):
     """A fresh process, so that solver and CAD kernel never meet in one; alone in its pool, so that it dies alone."""
 
+    executor: "ProcessPoolExecutor"
+
     def __init__(self) -> None:
         import multiprocessing
         from concurrent.futures import ProcessPoolExecutor
@@ -291,16 +297,34 @@ class _Process(Lane):
     def submit(self, work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> "Future[tuple[float, list[Result]]]":
         """Begin a chunk, in another process if this one has died at rest."""
         limited = partial(_within, _LIMIT_S, work)
-        try:
-            return super().submit(limited, inputs)
-        except self.deadly:
-            self.renew()
-            return super().submit(limited, inputs)
+        with _without_main():
+            try:
+                return super().submit(limited, inputs)
+            except self.deadly:
+                self.renew()
+                return super().submit(limited, inputs)
 
     def renew(self) -> None:
         """Another process in place of the dead one."""
         self.executor.shutdown()
         self.executor = _Process().executor
+
+    def end(self) -> None:
+        """End its process at once."""
+        for process in list((self.executor._processes or {}).values()):
+            process.terminate()
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """A spawned process would run the caller's script again, which need not guard itself: works are of modules."""
+    with _STARTING:
+        main = sys.modules["__main__"]
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            yield
+        finally:
+            sys.modules["__main__"] = main
 
 
 def cores() -> int:
@@ -326,16 +350,14 @@ def open_lanes(jobs: int, cluster: str = "") -> "AbstractContextManager[Sequence
 @contextmanager
 def _processes(jobs: int) -> Iterator[Sequence[Lane]]:
     """Processes of this computer, ended at once if anything goes wrong."""
-    import multiprocessing
-
     before = {name: os.environ.get(name) for name in _ENVIRONMENT}
     os.environ.update(_ENVIRONMENT)
     lanes = [_Process() for _ in range(jobs)]
     try:
         yield lanes
     except BaseException:
-        for process in multiprocessing.active_children():
-            process.terminate()
+        for lane in lanes:
+            lane.end()
         raise
     finally:
         # wait: else the interpreter, as it ends, may write to a pipe that the pool's thread closes

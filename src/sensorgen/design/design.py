@@ -10,7 +10,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 from pydantic.functional_validators import ModelWrapValidatorHandler
 
 from sensorgen.core import display, yamlfile
@@ -61,6 +68,18 @@ class Slots(Strict):
     isolation: Slot = "x60"
     support: Slot | None = stated(None, "Fills the air while printing; left empty when not given.")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _by_part(cls, data: Any) -> Any:
+        """Name both electrodes where ``electrode`` is given."""
+        return packs.slots(data) if isinstance(data, Mapping) else data
+
+    @model_serializer(mode="wrap")
+    def _apart(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """State a film of the default material too, which is of the dielectric's where it is not given."""
+        given: dict[str, Any] = handler(self)
+        return given | {"film": self.film, "isolation": self.isolation} if "dielectric" in given else given
+
 
 class Leads(Strict):
     """Leads between the sensor and the meter: in parallel, in series, and the state of their guard."""
@@ -104,7 +123,7 @@ class Design(Strict):
     def _constructed(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         """Errors of a design that is constructed in Python, in the words of a file's."""
         try:
-            design = handler(data)
+            design = handler(_one_dielectric(data) if isinstance(data, dict) else data)
         except ValidationError as error:
             for key in _parameters_of(data) & set(data if isinstance(data, Mapping) else ()):
                 raise BadInput(f"{key} is a parameter; expected parameters: {{{key}: {data[key]}}}") from None
@@ -596,7 +615,7 @@ def _imported(design: Design) -> Design:
     imported.check(design.geometry, design.bodies, design.parameters)
     conductors = {name for slot in design._filled() if design.conducts(name := slot.partition("@")[0])}
     parts = imported.slots(design.geometry or "", design.bodies, conductors)
-    given = design.materials.model_dump(include=design.materials.model_fields_set)
+    given = {part: getattr(design.materials, part) for part in design.materials.model_fields_set}
     return design.model_copy(update={"materials": Slots(**{**parts, **given}), "parameters": {}})
 
 

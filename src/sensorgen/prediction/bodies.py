@@ -9,7 +9,7 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.files import reading
 from sensorgen.design.body import DRAWN, Body, Cells, FilmThickness
 from sensorgen.design.design import Design, make
@@ -132,7 +132,14 @@ def estimated(design: Design, walls: str = "") -> Body:
         What is printed.
     walls : str
         One of ``WALLS`` alone; if not given, all that the design's walls can come out as, the likeliest first.
+
+    Raises
+    ------
+    UnknownName
+        No such walls.
     """
+    if walls not in ("", *WALLS):
+        raise UnknownName("walls", walls, WALLS)
     design = _one(design)
     rules = (walls,) if walls else wall_rules(design.profile.walls)
     provenance = f"printed, estimated ({WALLS.get(rules[0], rules[0])})"

@@ -203,7 +203,7 @@ def _computed(body: Body, asked: CapacitanceQuestion) -> CellCapacitance:
         reached=total.reached(), accuracy=total.wanted if total.wanted < inf else None,
         known=total.known, area_m2=area_m2, tan_delta=tan_delta,
         frequency_hz=asked.frequency_hz if loss else None, refused=total.refused, plan=total.plan, values=tuple(values),
-        doubts=cells.remarks.get(next(iter(cells.scenes)), ()),
+        doubts=(*cells.remarks.get(next(iter(cells.scenes)), ()), *rest_state.perfect_interfaces(design)),
     )  # fmt: skip
 
 

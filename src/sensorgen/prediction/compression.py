@@ -37,6 +37,7 @@ from sensorgen.prediction.compression_law import (
 )
 from sensorgen.prediction.mesh_ladder import Case, Estimate, PressedPiece, why_not_applicable
 from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_until_within
+from sensorgen.prediction.rest_state import perfect_interfaces
 from sensorgen.prediction.sensor_model import piece as piece_of
 from sensorgen.prediction.sweep import Sweeper
 
@@ -537,9 +538,10 @@ def _under_tops(
 
 
 def _assumed(design: Design) -> Iterator[str]:
-    """Values of the cell that no source gives, with their ranges."""
+    """Values of the cell that no source gives, with their ranges; and interfaces that are left out."""
     elastic = (of_all_materials(design, q).values() for q in ("youngs_modulus_pa", "poisson_ratio"))
-    return assumed(design, (*chain.from_iterable(elastic), *permittivities(design)))
+    values = (*chain.from_iterable(elastic), *permittivities(design))
+    return chain(assumed(design, values), perfect_interfaces(design))
 
 
 def _known(values: Real) -> tuple[float | None, ...]:

@@ -178,6 +178,10 @@ def material_ends(model: SensorModel, reference: ReferenceLoad) -> Iterator[Assu
             for ratio in ratios
         ]  # fmt: skip
         yield Assumption(f"permittivity of {name}", f"{low:.3g} to {high:.3g}", "material", ends)
+    by = model.rest.by_interface
+    if by.lower < by.upper:
+        ends = _with_capacitances(model, (by.lower, by.upper))
+        yield Assumption("interfaces", "gap of the film's interfaces, as its source says", "material", ends)
     farad, ohm = added(model.body)
     what = f"leads and edge, {_range_text([(1e12 * farad.least, 1e12 * farad.most)])} pF"
     yield Assumption("lead capacitance", what, "leads", [replace(sensor, lead_f=end) for end in farad[1:]])

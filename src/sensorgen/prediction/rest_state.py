@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange
-from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM, si
 from sensorgen.design import values as stated
 from sensorgen.design.body import Body, Cells
 from sensorgen.design.design import Design
-from sensorgen.design.materials import FILM_LEAK, SET
+from sensorgen.design.materials import FILM_LEAK, INTERFACE_GAP, SET
 from sensorgen.design.values import MaterialValue
 from sensorgen.prediction.capacitance import PLANE, Answer, Unpredictable, capacitance, default_width, of_sensor
 from sensorgen.scene.scene import Scene
@@ -176,7 +176,7 @@ def lost(design: Design) -> Lost:
     taken, sets = stated.permittivities(design), set_losses(design)
     parts = {quantity: [t for t in sets if t.quantity == quantity] for quantity in LOSSES}
     tangents, leaks = (_tangent(design, taken, parts[quantity]) for quantity in LOSSES)
-    film = _film_leak(design)
+    film = _of_film(design, FILM_LEAK)
     through_film_s = sum(t.value for t in film) * design.area_mm2 * M_PER_MM**2
     largest = _largest(design, taken, parts[LOSSES[0]])
     leak_s, doubts = 2 * pi * LOWEST_HZ * leaks[1] + through_film_s, tuple(_strong(taken, parts[LOSSES[1]]))
@@ -195,14 +195,21 @@ def _largest(design: Design, taken: Sequence[MaterialValue], given: Sequence[Mat
     return _tangent(design, taken, [*given, *assumed])[0]
 
 
-def _film_leak(design: Design) -> list[MaterialValue]:
-    """Leak of the film per area [S/m2], where one is known."""
+def perfect_interfaces(design: Design) -> Iterator[str]:
+    """Doubt about a cell alone, where a source says the gap of the film's interfaces."""
+    for gap in _of_film(design, INTERFACE_GAP):
+        at = f"{si(gap.value, 'm')} ({gap.source})"
+        yield f"the film's interfaces are taken as perfect; predict takes their gap, {at}"
+
+
+def _of_film(design: Design, quantity: str) -> list[MaterialValue]:
+    """A film's leak per area [S/m2], or the air gap equal to its interfaces [m], where one is known."""
     material, source = design.slot("film")
     try:
-        value = material.value(FILM_LEAK, source or design.used().get(material.name, ""))
+        value = material.value(quantity, source or design.used().get(material.name, ""))
     except MissingValue:
         return []
-    return [MaterialValue(material.name, FILM_LEAK, value.value, value.source)]
+    return [MaterialValue(material.name, quantity, value.value, value.source)]
 
 
 def _tangent(design: Design, taken: Sequence[MaterialValue], some: Sequence[MaterialValue]) -> tuple[float, float]:
@@ -227,6 +234,7 @@ def _strong(taken: Sequence[MaterialValue], leaks: Sequence[MaterialValue]) -> I
             )
 
 
+_LEAST_FILM = 0.1  # share of the film that interfaces leave at the least [-]
 _TOLD_APART = 1.001  # ratio of permittivities from which on a range counts: that of air does not
 
 
@@ -253,6 +261,8 @@ class RestState:
         With a film one layer thinner; 0 where none is left, or without ranges [F].
     doubts : tuple of str
         Which other ways to print it have no capacitance, and why.
+    by_interface : Interval
+        What the gap of the film's interfaces leads to alone [F].
     """
 
     answer: Answer
@@ -262,8 +272,9 @@ class RestState:
     values: tuple[MaterialValue, ...]
     by_width: Interval
     by_film: Interval
-    layer_thinner_f: float = 0.0
-    doubts: tuple[str, ...] = ()
+    layer_thinner_f: float
+    doubts: tuple[str, ...]
+    by_interface: Interval
 
 
 def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -> RestState:
@@ -297,9 +308,11 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
         answer = of_sensor(cells, eps, wanted)
     except Unpredictable as error:
         raise Unpredictable("; ".join((*remarks, str(error)))) from None
-    c = answer.capacitance_f
+    gap = _of_film(body.design, INTERFACE_GAP)
+    interface = _interface_ratios(body, gap, eps, answer.capacitance_f.middle())
+    c = answer.capacitance_f.times(interface.value)
     ways = cells if ranges else replace(cells, scenes={"most likely": scene}, film=None)
-    others, unknown, unbounded = _other_prints(ways, eps, wanted)
+    others, unknown, unbounded = _other_prints(ways, eps, wanted, interface.value)
     by_width = Interval(min([c.middle(), *others]), max([c.middle(), *others]))
     thick, thin, layer = _film_ratios(ways, eps)
     thinnest = thin or 1.0
@@ -308,17 +321,20 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
     bounds = Bounds.of(
         c.middle(), "F", model=c, print=by_print, certified=True,
         open="upper" if unbounded or thin is None else "",
-        material=_permittivity_range(body.design, scene, c.middle()) if ranges else Interval(c.middle(), c.middle()),
+        material=_material_range(body.design, scene, c.middle(), interface) if ranges else None,
     )  # fmt: skip
     ends = (rho["top"].value, rho["bottom"].value)
     resistance, missing = _resistance(body)
     doubts = (*remarks, *unknown, *missing)
     return RestState(
-        answer, bounds, resistance, ends, (*values, *rho.values()), by_width, by_film, layer * c.middle(), doubts
+        answer, bounds, resistance, ends, (*values, *gap, *rho.values()), by_width, by_film, layer * c.middle(), doubts,
+        Interval(*interface[1:]).times(answer.capacitance_f.middle()),
     )  # fmt: skip
 
 
-def _other_prints(cells: Cells, eps: Mapping[str, float], width: float) -> tuple[list[float], list[str], bool]:
+def _other_prints(
+    cells: Cells, eps: Mapping[str, float], width: float, factor: float
+) -> tuple[list[float], list[str], bool]:
     """Capacitances of other ways to print it [F], why some have none, and True where one of these is a short."""
     first, *others = dict.fromkeys(cells.scenes.values())
     coarse = 2 * width if is_open(first) else width  # whole sensors take long
@@ -326,7 +342,7 @@ def _other_prints(cells: Cells, eps: Mapping[str, float], width: float) -> tuple
     for scene in others:
         rule = next(name for name, cell in cells.scenes.items() if cell == scene)
         try:
-            values.append(capacitance(scene, eps, coarse).capacitance_f.middle() * cells.count)
+            values.append(capacitance(scene, eps, coarse).capacitance_f.middle() * cells.count * factor)
         except Unpredictable as error:
             unbounded |= cells.gap_mm.get(rule) == 0
             doubts.append(f"printed by the rule {rule!r} it has no capacitance: {error}")
@@ -362,15 +378,33 @@ def _film_ratios(cells: Cells, eps: Mapping[str, float]) -> tuple[float, float |
     return of(cells.film.thicker) / usual, thinner, layer or 0.0
 
 
-def _permittivity_range(design: Design, scene: Scene, middle: float) -> Interval:
-    """The capacitance with every permittivity at the lowest and at the highest of its sources [F].
+def _material_range(design: Design, scene: Scene, middle: float, interface: "Added") -> Interval:
+    """The capacitance with every permittivity, and the interfaces, at both ends of their ranges [F].
 
     Ratios by the closed-form bounds of the cell, whose error mostly cancels.
     """
-    ratios = permittivity_ratios(design, scene)
-    return Interval(
-        middle * prod(low for low, _ in ratios.values()), middle * prod(high for _, high in ratios.values())
+    ratios = [*permittivity_ratios(design, scene).values(), [end / interface.value for end in interface[1:]]]
+    return Interval(middle * prod(low for low, _ in ratios), middle * prod(high for _, high in ratios))
+
+
+def _interface_ratios(body: Body, gap: Sequence[MaterialValue], eps: Mapping[str, float], farad: float) -> "Added":
+    r"""Capacitance with the interfaces of the film, over that of perfect ones: value, least and most [-].
+
+    .. math:: 1 + \frac{g C}{\varepsilon_0 A} \le \frac{C}{C_g} \le 1 + \frac{\varepsilon g}{t}
+
+    A thin gap g takes least where the field is even (Cauchy-Schwarz), and most where all of it is in the thinnest film
+    t; of plates both are exact. The value is the middle of both.
+    """
+    if not gap:
+        return Added(1.0, 1.0, 1.0)
+    even = farad / (EPS0_F_PER_M * body.design.area_mm2 * M_PER_MM**2)
+    film_mm = next(iter(body.cells.gap_mm.values()), inf)
+    thinnest = eps[gap[0].material] / (film_mm * M_PER_MM) if film_mm else even
+    usual, *ends = (
+        [1 / max(1 + g * by, _LEAST_FILM) for by in (even, thinnest)]
+        for g in (gap[0].value, *stated.spread(body.design, gap[0]))
     )
+    return Added(sum(usual) / 2, min(map(min, ends)), max(map(max, ends)))
 
 
 def permittivity_ratios(design: Design, scene: Scene) -> dict[str, tuple[float, float]]:

@@ -396,6 +396,11 @@ class Prediction(Boundless, Displayed):
         return "; ".join(top.words(*most) for top in self.tops)
 
     @property
+    def exact(self) -> bool:
+        """True where resolutions are known of a perfect model alone."""
+        return bool(self.force_resolution) and not any(top.calibrated for top in self.under())
+
+    @property
     def conditional(self) -> bool:
         """True where it rests on values that no source gives."""
         return any(value.source == ASSUMED for value in self.values)
@@ -420,7 +425,7 @@ class Prediction(Boundless, Displayed):
         rows = [(name, *(each.get(name) for each in words)) for name in words[-1]]
         columns = (Column(""), *(Column(p.body.partition(",")[0]) for p in shown))
         yield Table("quantities", "", columns, tuple(rows))
-        yield caption_of(self.force_n, self.position_m, self.body)
+        yield caption_of(self.force_n, self.position_m, self.body, exact=self.exact)
         if self.tops:
             yield f"the worst of: {self.by_top()}"
         if self.narrowing:
@@ -563,9 +568,10 @@ class Overview(Prediction):
         yield f"(--details: causes of the ranges, impedance, error budget, {len(self.assumptions)} assumptions)"
 
 
-def caption_of(force_n: float, position_m: float, body: str) -> str:
+def caption_of(force_n: float, position_m: float, body: str, *, exact: bool) -> str:
     """For which press, after what calibration and of which body resolutions are stated."""
-    return f"(resolution after 30 known presses, at {force_n:g} N and {position_m * 1e3:g} mm; {body})"
+    known = "of a perfect model" if exact else "after 30 known presses"
+    return f"(resolution {known}, at {force_n:g} N and {position_m * 1e3:g} mm; {body})"
 
 
 def on_bench(exact: Bounds | None, calibrated: float | None) -> Bounds | None:

@@ -1,9 +1,9 @@
 """The public functions, for notebooks and programs: ``import sensorgen as sg``."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,6 +48,9 @@ if TYPE_CHECKING:
     from sensorgen.workflows.batch import Batch
     from sensorgen.workflows.characterise import Planned
     from sensorgen.workflows.optimise.result import Optimised
+
+
+_Kind = TypeVar("_Kind")
 
 
 def load(path: str | Path) -> Design:
@@ -135,7 +138,8 @@ def predict(
     >>> p.status, round(p.drawn.resistance["top"].value)  # ohm
     ('predicted', 1400)
     """
-    query = Query(_numbers("frequency_hz", frequency_hz), law=law, tip=tip, accuracy=accuracy, noise=noise)
+    tones_hz, accuracy = _numbers("frequency_hz", frequency_hz), _above_0("accuracy", accuracy)
+    query = Query(tones_hz, law=law, tip=_of_type("tip", tip, Tip) if tip else None, accuracy=accuracy, noise=noise)
     forces, positions = _numbers("force_n", force_n), _numbers("position_mm", position_mm)
     if not isinstance(what, Design | Body):
         if forces or positions:
@@ -170,8 +174,13 @@ def sweep(
     >>> [round(point.prediction.drawn.capacitance.value * 1e12) for point in found.results]  # pF
     [104, 69, 104, 69]
     """
-    if not values or not all(np.ndim(some) == 1 and len(some) for some in values.values()):
-        raise BadInput("sweep() without values; expected some of a setting, as dielectric_mm=[0.2, 0.3]")
+    wrong = [f"{key}={some!r:.60}" for key, some in values.items() if np.ndim(some) != 1 or not len(some)]
+    if wrong or not values:
+        given = (*wrong, "sweep() without values")[0]
+        raise BadInput(f"{given}; expected values of a setting, as dielectric_mm=[0.2, 0.3]")
+    if _of_type("jobs", jobs, int) < 1:
+        raise BadInput(f"jobs={jobs}; expected 1 or more processes")
+    _of_type("query", query, Query)
     points = [(chosen, _body(one)) for chosen, one in varied(_named(design), values)]
     if unloaded:
         return at_rest.sweep(tuple(values), points, at_rest.CapacitanceQuestion(query.accuracy), jobs, _silent)
@@ -198,8 +207,8 @@ def cell(
     >>> round(found.lower_f_per_m2 * 1e9, 2)  # nF/m2
     69.06
     """
-    _numbers("frequency_hz", () if frequency_hz is None else frequency_hz)
-    asked = at_rest.CapacitanceQuestion(accuracy, frequency_hz=frequency_hz)
+    frequency_hz = _above_0("frequency_hz", frequency_hz)
+    asked = at_rest.CapacitanceQuestion(_above_0("accuracy", accuracy), frequency_hz=frequency_hz)
     if not isinstance(what, Design | Body):
         return at_rest.sweep("design", _points(what), asked, 1, _silent)
     return at_rest.answer(_body(what), asked)
@@ -230,8 +239,10 @@ def compress(
     >>> found.stress_kpa
     (0.0, 10.0)
     """
-    wanted = inf if accuracy is None else accuracy
-    pressures = compression.stresses_kpa(_numbers("pressure_kpa", pressure_kpa) or (0.0,))
+    wanted, pressures = _above_0("accuracy", accuracy) or inf, _numbers("pressure_kpa", pressure_kpa)
+    if not any(pressures):
+        raise BadInput(f"pressure_kpa={pressure_kpa!r:.60}; expected a pressure above 0")
+    pressures = compression.stresses_kpa(pressures)
     asked = compression.PressQuestion(pressures, BoundaryConditions(), accuracy=wanted)
     if not isinstance(what, Design | Body):
         return compression.sweep("design", _points(what), asked, 1, _silent)
@@ -308,15 +319,10 @@ def export_design(design: Design, path: str | Path, gcode: str | Path | None = N
     ...     [file.name for file in export_design(Design(shape="reference"), Path(folder) / "plate.3mf")]
     ['plate.3mf']
     """
-    from sensorgen.asprinted import printed as asprinted
-    from sensorgen.export.gcode import motion
     from sensorgen.workflows import export as exports
 
     design = _named(design)
-    content = None if gcode is None else Path(gcode).read_bytes()
-    printed = (
-        asprinted.body(design, motion.read(content, design.machine)) if content else reviewed(design).printed(design)
-    )
+    printed = reviewed(design).printed(design) if gcode is None else bodies.registered(design, Path(gcode))
     return exports.export(printed, Path(path))
 
 
@@ -337,14 +343,18 @@ def batch(plan: str | Path, out: str | Path = "out", *, gcode: bool = True, forc
     return make(Path(plan), Path(out), gcode=gcode, force=force)
 
 
-def characterise(printer: str, conductor: str, dielectric: str, out: str | Path = "out") -> "Planned":
+def characterise(
+    printer: str, conductor: str, dielectric: str, out: str | Path = "out", *, quality: str = "fine",
+    tools: Mapping[str, int] | None = None, **limits: Any,
+) -> "Planned":  # fmt: skip
     """Choose coupons that measure two materials on a printer, and write the files of their plate.
 
-    As :func:`sensorgen.workflows.characterise.plan`; the filled form is read by ``sensorgen characterise``.
+    As :func:`sensorgen.workflows.characterise.plan`, which takes ``name``, ``count`` and ``hours``; ``tools`` are
+    those of materials that the printer's file does not name. ``sensorgen characterise`` reads the filled form.
     """
     from sensorgen.workflows.characterise import Study, plan
 
-    return plan(Study.of(printer, (conductor, dielectric)), Path(out))
+    return plan(Study.of(printer, (conductor, dielectric), quality=quality, tools=tools), Path(out), **limits)
 
 
 def optimise(target: str | Path, out: str | Path = "out") -> "Optimised":
@@ -437,7 +447,7 @@ def _check_readings(z: Complex, at_rest: Complex, tones: int, noise: float | Non
     """Refuse readings of other shapes, and a noise that is none."""
     if z.ndim != 2 or z.shape[1] != tones:
         raise BadInput(f"impedance_ohm of shape {z.shape}; expected (n, {tones}), a column for each frequency")
-    if noise is not None and not 0 < noise <= 1:
+    if (_above_0("noise", noise) or 1.0) > 1:
         raise BadInput(f"noise={noise!r:.20}; expected a number above 0, up to 1")
     if perfect and at_rest.size:
         raise BadInput("rest_ohm beside perfect=True, which needs no reading at rest; expected one of them")
@@ -454,6 +464,8 @@ def calibrate(log: Log, *specimens: str, bench: Bench | None = None) -> list[Cal
     ``Calibration.inverter()`` then finds force and position. Parameters and errors as of
     :func:`sensorgen.analysis.calibration.calibrate`.
     """
+    if not specimens:
+        raise BadInput("calibrate() without specimens; expected their names, as '23 triX .2mm 1'")
     return [work.calibration for work in calibrations.calibrate(log, specimens, bench)]
 
 
@@ -473,22 +485,44 @@ def _named(design: Design) -> Design:
     """A design as :func:`sensorgen.design.design.make` completes it, also where it was constructed by hand."""
     if not isinstance(design, Design):
         raise BadInput(f"{design!r:.60}: expected a Design or a Body, as Design(shape='tri') or load('mine.yaml')")
-    return design if design.name else designs.make(design.model_dump(exclude_defaults=True, mode="json"))
+    if design.name and (design.border or design.geometry):  # whose files were read
+        return design
+    made = designs.make(design.model_dump(exclude_defaults=True, mode="json"))
+    return design if made == design else made
 
 
 def _numbers(name: str, values: ArrayLike) -> tuple[float, ...]:
     """Rising numbers from 0 on."""
-    numbers = np.atleast_1d(np.asarray(values, float))
+    try:
+        numbers = np.atleast_1d(np.asarray(values, float))
+    except (TypeError, ValueError):  # words
+        numbers = np.array([np.nan])
     if numbers.ndim > 1 or not (np.isfinite(numbers).all() and (numbers >= 0).all() and (np.diff(numbers) > 0).all()):
         raise BadInput(f"{name}={values!r:.60}; expected a number, or rising numbers, from 0 on")
     return tuple(numbers.tolist())
 
 
-def _several(what: object) -> Sequence[Any]:
-    """A sequence of designs that is none of characters, and not empty."""
-    if isinstance(what, str) or not isinstance(what, Sequence) or not what:
+def _above_0(name: str, value: float | None) -> float | None:
+    """A number above 0, or None where none is given."""
+    numbers = () if value is None else _numbers(name, value)
+    if value is not None and (len(numbers) != 1 or not numbers[0]):
+        raise BadInput(f"{name}={value!r:.60}; expected a number above 0")
+    return numbers[0] if numbers else None
+
+
+def _of_type(name: str, value: _Kind, kind: type[_Kind]) -> _Kind:
+    """A value of its type."""
+    if not isinstance(value, kind):
+        raise BadInput(f"{name}={value!r:.60}; expected a sensorgen.{kind.__name__}")
+    return value
+
+
+def _several(what: object) -> list[Any]:
+    """Designs of a sequence that is none of characters, and not empty."""
+    several = list(what) if isinstance(what, Iterable) and not isinstance(what, str | Mapping) else []
+    if not several:
         raise BadInput(f"{what!r:.60}: expected a Design, as Design(shape='tri') or load('mine.yaml'), or some of them")
-    return what
+    return several
 
 
 def _points(many: Sequence[Design | Body]) -> list[tuple[str, Body]]:

@@ -15,7 +15,7 @@ from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.cache import Unknown, only_known
 from sensorgen.core.display import Boundless, Displayed
-from sensorgen.core.document import Part, apart
+from sensorgen.core.document import Part, Table, apart
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.findings import Finding, headline, listed, most_severe
 from sensorgen.core.version import __version__
@@ -93,6 +93,10 @@ class Built(Boundless, Displayed):
         yield from apart(listed(most_severe(self.findings, 3)), advice)
         yield ""
         yield from self.written()
+
+    def table(self) -> Table:
+        """Quantities of the prediction, as numbers."""
+        return self.prediction.table()
 
     def written(self) -> Iterator[Part]:
         """Where the files are; nothing before they are there."""

@@ -211,7 +211,8 @@ def table(tried: Trial) -> Iterator[Part]:
     if tried.toolpath:
         rows.append(("print time", "", f"at least {tried.toolpath.time_s / 60:.0f} min"))
     yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
-    yield caption_of(tried.force_n, tried.position_m, tried.body)
+    exact = tried.printed.force_resolution and not tried.printed.force_calibrated
+    yield caption_of(tried.force_n, tried.position_m, tried.body, exact=bool(exact))
     if tried.printed.by_top:
         yield f"printed, the worst of: {tried.printed.by_top}"
     yield from tried.rests_on

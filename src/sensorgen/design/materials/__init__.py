@@ -194,7 +194,7 @@ def names() -> list[str]:
 @cache
 def quantities() -> list[str]:
     """Names of all quantities that a material can have, those of printing left out."""
-    return sorted({quantity for name in names() for quantity in load(name).properties} | {FILM_LEAK})
+    return sorted({quantity for name in names() for quantity in load(name).properties} | {FILM_LEAK, INTERFACE_GAP})
 
 
 @cache

@@ -238,6 +238,7 @@ class Inverter:
         if ratio.ndim != 2 or ratio.shape[1] != m:
             raise BadInput(f"readings of shape {ratio.shape}; expected (n, {m}), a column for each calibrated tone")
         measured = np.isfinite(ratio)
+        ratio = np.where(measured, ratio, np.nan)
         below = parts(ratio) @ self._fall
         anywhere = np.eye(1, len(_STRETCHES)).repeat(len(ratio), 0)
         readings = _Readings(parts(ratio), anywhere, np.ones(1), self._by_load[:1])
@@ -447,6 +448,8 @@ def of_design(
     mean, count = rest.mean()
     if not np.isfinite(mean).all():
         raise BadInput("a frequency without a reading at rest; expected one at each")
+    if len(frequency_hz) < _FEW_TONES:
+        raise BadInput("readings at one frequency; expected two or more, or --perfect (perfect=True)")
     model = SpecimenModel(predicted.sensor, frequency_hz, spread_of(predicted, Bench()))
     known = by_rest(model, np.log(mean), noise / count**0.5, noise)
     return Inverter(model, known, prior, force_limit_n)

@@ -115,7 +115,7 @@ def arranged(path: Path) -> Arranged:
     Raises
     ------
     BadInput
-        The plan is wrong, or needs more than one plate.
+        The plan is wrong, needs more than one plate, or has its specimens less than two lines apart.
     OutOfRange
         One of its specimens fits on no plate.
     """
@@ -124,6 +124,10 @@ def arranged(path: Path) -> Arranged:
     first = specimens[0].design
     count = len(tools(piece.design for piece in specimens))
     here = room(first.machine, first.layers, count, plan.layout.spacing_mm, plan.layout.brim_mm)
+    if len(specimens) > 1 and here.gap_mm < (least := 2 * first.machine.line_mm()):
+        raise BadInput(
+            f"{path}: specimens {here.gap_mm:g} mm apart print as one; expected layout.spacing_mm of {least:g} or more"
+        )
     layout = packed if plan.layout.kind == "packed" else column(plan.layout.per_column)
     try:
         plates = layout([_size(plan, piece) for piece in specimens], here)
