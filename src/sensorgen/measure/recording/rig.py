@@ -4,16 +4,18 @@ The sensor responds to the force, so that the recording is fitted by
 
 .. math::
    y(t) = \sum_{i=0}^{3} c_i t^i + \sum_{i=1}^{2} b_i \ln(1 + t / \tau_i) + \sum_{i=1}^{3} \sum_{j=0}^{2} c_{ij} F^i x^j
-          + (\hat F - F) \sum_{i=0}^{2} h_i F^i + \sum_{i=1}^{4} d_i \int_0^t F(s)\, e^{-(t - s)/T_i} \frac{ds}{T_i}
+          + \sum_{i=1}^{3} e_i (F - F_i)_+ + (\hat F - F) \sum_{i=0}^{2} h_i F^i
+          + \sum_{i=1}^{5} d_i \int_0^t F(s)\, e^{-(t - s)/T_i} \frac{ds}{T_i}
 
 with F and x shifted by the offset, y the principal component of ln Z, creep with time constants of a tenth and a
-hundredth of the run, and relaxation times T from one second to a minute: without them a slow film would count as a late
-clock, and hysteresis without the terms of the largest force of the press so far, :math:`\hat F`. A cross-correlation
-over all offsets gives the start, then a search around it, then Gauss-Newton. The standard error is that of the fit,
-with the number of independent samples.
+hundredth of the run, and relaxation times T from one second to half a minute: without them a slow film would count as
+a late clock, as hysteresis without the terms of the largest force of the press so far, :math:`\hat F`, and a law that
+is steep at small forces without the bends at :math:`F_i`. A cross-correlation over all offsets gives the starts, its
+highest peaks: equal presses resemble themselves half a period late, too. From each follow a search and Gauss-Newton;
+the least standard error counts. That is the fit's, with the number of independent samples.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -210,7 +212,9 @@ MAD = 0.6745  # median absolute deviation of noise over its standard deviation
 _CLEAR = 4.0  # least unloading that is told from noise, over its standard deviation [-]
 _LIFTED = 0.005  # of the largest force: below it the tip does not press
 _RELAXATION_S = (1.0, 2.0, 4.0, 8.0, 32.0)
-_AROUND_S, _FEW = np.linspace(-2.0, 2.0, 41), 4000  # of the search around the best correlation; samples for it
+_PEAK, _PEAKS, _APART_S = 0.8, 6, 1.0  # of the correlation: share of the highest, number, and distance of those tried
+_AROUND_S, _FEW = np.linspace(-2.0, 2.0, 41), 4000  # of the search around each of them; samples for it
+_BENDS = (1 / 64, 1 / 16, 1 / 4)  # of the law, over the largest force
 
 
 @dataclass(frozen=True)
@@ -278,12 +282,18 @@ def estimated(recording: Recording, time: Real, rig: RigLog, within_s: float) ->
         raise BadInput(f"{rows} rows of the rig and {len(valid)} samples without errors; expected at least 2 and 16")
     used = valid[:: max(1, len(valid) // _MOST_FITTED)]
     signal = principal_component(recording.impedance_ohm[used])
-    return _refined(time[used], signal, rig, _correlated(time[used], signal, rig, within_s))
+    starts = _correlated(time[used], signal, rig, within_s)
+    return _surest(_refined(time[used], signal, rig, start) for start in starts)
 
 
-def _correlated(time: Real, signal: Real, rig: RigLog, within_s: float) -> float:
-    """Offset with the largest cross-correlation of signal and force [s]."""
-    from scipy.signal import correlate
+def _surest(offsets: Iterable[Offset]) -> Offset:
+    """Offset with the least standard error; one of a response goes before."""
+    return min(offsets, key=lambda offset: (offset.by_chance, offset.offset_error_s))
+
+
+def _correlated(time: Real, signal: Real, rig: RigLog, within_s: float) -> list[float]:
+    """Offsets at the highest peaks of the cross-correlation of signal and force [s]."""
+    from scipy.signal import correlate, find_peaks
 
     rows, force, _, _ = rig.sound()
     step = max(_GRID_S, (np.ptp(time) + np.ptp(rows)) / _MOST_GRID)
@@ -302,7 +312,9 @@ def _correlated(time: Real, signal: Real, rig: RigLog, within_s: float) -> float
             f"{time[0] - rows[0]:.6g} s apart"
         )
     score = np.where(allowed, correlation / np.sqrt(np.maximum(shared, 1)), -1.0)
-    return float(offsets[int(np.argmax(score))])
+    edged = np.pad(score, 1, constant_values=-1.0)
+    peaks = find_peaks(edged, height=_PEAK * score.max(), distance=max(round(_APART_S / step), 1))[0] - 1
+    return [float(offsets[k]) for k in peaks[np.argsort(-score[peaks])][:_PEAKS]]
 
 
 def _high_pass(values: Real) -> Real:
@@ -316,17 +328,20 @@ def _responses(rig: RigLog) -> Callable[[Real], Real]:
     """Terms of force and position in the fit, at any times of the rig's clock."""
     rows, force, _, position = rig.sound()
     where = (position - position.mean()) / max(float(np.ptp(position)), 1e-9)
-    slow = [relaxation(rows, force, tau) for tau in _RELAXATION_S]
+    least = 2 * float(np.median(np.diff(rows)))  # a faster relaxation and a late clock look alike in so few rows
+    slow = [relaxation(rows, force, max(tau, least)) for tau in _RELAXATION_S]
     noise = float(np.median(np.abs(np.diff(force, 2)))) / (MAD * 6**0.5) if len(force) > 2 else 0.0
     pressed = force > max(_LIFTED * force.max(), _CLEAR * noise)
     apart = np.cumsum(np.diff(pressed, prepend=False)) * 2 * np.ptp(force)  # raises each press above those before
     peak = np.maximum.accumulate(force + apart) - apart
+    bends = [share * force.max() for share in _BENDS]
     way_back = np.where(pressed, np.maximum(peak - force - _CLEAR * noise, 0), 0)
 
     def responses(at: Real) -> Real:
         f, x, back = (np.interp(at, rows, column) for column in (force, where, way_back))
         powers = ((f, f * f, f * f * f), (1.0, x, x * x))  # products: ** takes five times as long
-        immediate = (*(a * b for a, b in product(*powers)), back, back * f, back * f * f)
+        bent = (np.maximum(f - bend, 0.0) for bend in bends)
+        immediate = (*(a * b for a, b in product(*powers)), *bent, back, back * f, back * f * f)
         return np.column_stack([*immediate, *(term(at) for term in slow)])
 
     return responses
@@ -493,7 +508,7 @@ def _best(recordings: Sequence[Recording], times: Sequence[Real], rig: RigLog, w
             faults.append(error)
     if not offsets:
         raise faults[0]
-    return min(offsets, key=lambda offset: (offset.by_chance, offset.offset_error_s))
+    return _surest(offsets)
 
 
 def _joined(recording: Recording, rig: RigLog, time: Real, offset: Offset) -> Joined:
