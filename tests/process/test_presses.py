@@ -233,7 +233,7 @@ def test_hysteresis_of_two_known_ways():
         hysteresis(force[:200], values[:200])
 
 
-def slow_loads(period_s, count, power, lens):
+def slow_loads(period_s, count, power, lens, noise_n=0.001):
     """Up and down again in 12 s each, to 6 N, by a rig 2 s early; of a film with a lens of hysteresis."""
 
     def force(time_s):
@@ -246,7 +246,7 @@ def slow_loads(period_s, count, power, lens):
     noise = 2e-4 * (rng.standard_normal(len(t)) + 1j * rng.standard_normal(len(t)))
     z = ((1000 - 5000j) * (1 - 0.06 * share) * (1 + noise))[:, None]
     one = Recording(t, np.array([1.1e3]), z, blank(len(t)), RecordingClock(), Source("", "", rate_hz=50))
-    measured = force(rows) + 0.001 * rng.standard_normal(len(rows))
+    measured = force(rows) + noise_n * rng.standard_normal(len(rows))
     return one, RigLog(rows - 2.0, force(rows), 50 + 0 * rows, measured, np.zeros(len(rows), bool))
 
 
@@ -264,12 +264,12 @@ def test_hysteresis_is_no_late_clock_and_its_error_has_that_of_the_clock():
         assert way.error[1] == pytest.approx(2 * 0.05 / 5.8, rel=0.25)
 
 
-@pytest.mark.parametrize("lens", [0.0, 0.1])
-def test_equal_loads_of_a_film_that_is_steep_at_first_tell_its_hysteresis(lens):
-    one, log = slow_loads(29, 8, power=0.75, lens=lens)  # as like itself half a period late as in time
-    assert joined(one, log).clocks.offset_s == pytest.approx(2, abs=0.03)  # less than a row of the rig
+@pytest.mark.parametrize(("lens", "noise_n"), [(0.0, 0.001), (0.1, 0.001), (0.0, 0.03)])
+def test_equal_loads_of_a_film_that_is_steep_at_first_tell_its_hysteresis(lens, noise_n):
+    one, log = slow_loads(29, 8, 0.75, lens, noise_n)  # as like itself half a period late as in time
+    assert joined(one, log).clocks.offset_s == pytest.approx(2, abs=0.04)  # a row of the rig
     for way in of_presses(processed(one, log, law="line")).ways.values():
-        assert way.share[1] == pytest.approx(lens / (1 - (0.2 / 6) ** 0.75), abs=0.01)
+        assert way.share[1] == pytest.approx(lens / (1 - (0.2 / 6) ** 0.75), abs=0.015)
 
 
 def test_a_surface_is_straight_between_its_presses_and_blank_beyond():

@@ -11,11 +11,12 @@ with F and x shifted by the offset, y the principal component of ln Z, creep wit
 hundredth of the run, and relaxation times T from one second to half a minute: without them a slow film would count as
 a late clock, as hysteresis without the terms of the largest force of the press so far, :math:`\hat F`, and a law that
 is steep at small forces without the bends at :math:`F_i`. A cross-correlation over all offsets gives the starts, its
-highest peaks: equal presses resemble themselves half a period late, too. From each follow a search and Gauss-Newton;
-the least standard error counts. That is the fit's, with the number of independent samples.
+highest peaks, those where a press lowers abs(Z) if there are any: equal presses resemble themselves half a period late,
+too. From each follow a search and Gauss-Newton; the best fit counts. The standard error is that of the fit, with the
+number of independent samples.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -139,7 +140,7 @@ _ROUNDING = 1e-12  # of ln Z: a smaller spread is no signal
 
 
 def principal_component(impedance_ohm: Complex) -> Real:
-    """First principal component of ln Z in units of its noise, without linear trend.
+    """First principal component of ln Z in units of its noise, without linear trend; it rises as abs(Z) falls.
 
     Parameters
     ----------
@@ -171,7 +172,8 @@ def principal_component(impedance_ohm: Complex) -> Real:
     component = np.zeros_like(t)
     for weight, channel in zip(directions[0], channels, strict=True):
         component += weight * channel
-    return component
+    rises = component @ np.log(np.abs(impedance_ohm)).sum(axis=1) > 0
+    return -component if rises else component
 
 
 def relaxation(time_s: Real, force_n: Real, tau_s: float) -> Callable[[Real], Real]:
@@ -215,6 +217,7 @@ _RELAXATION_S = (1.0, 2.0, 4.0, 8.0, 32.0)
 _PEAK, _PEAKS, _APART_S = 0.8, 6, 1.0  # of the correlation: share of the highest, number, and distance of those tried
 _AROUND_S, _FEW = np.linspace(-2.0, 2.0, 41), 4000  # of the search around each of them; samples for it
 _BENDS = (1 / 64, 1 / 16, 1 / 4)  # of the law, over the largest force
+_MEAN_S = 0.5  # over which signal and responses are averaged before they are compared
 
 
 @dataclass(frozen=True)
@@ -283,16 +286,12 @@ def estimated(recording: Recording, time: Real, rig: RigLog, within_s: float) ->
     used = valid[:: max(1, len(valid) // _MOST_FITTED)]
     signal = principal_component(recording.impedance_ohm[used])
     starts = _correlated(time[used], signal, rig, within_s)
-    return _surest(_refined(time[used], signal, rig, start) for start in starts)
-
-
-def _surest(offsets: Iterable[Offset]) -> Offset:
-    """Offset with the least standard error; one of a response goes before."""
-    return min(offsets, key=lambda offset: (offset.by_chance, offset.offset_error_s))
+    refined = (_refined(time[used], signal, rig, start) for start in starts)
+    return min(refined, key=lambda offset: (offset.by_chance, -offset.explained))
 
 
 def _correlated(time: Real, signal: Real, rig: RigLog, within_s: float) -> list[float]:
-    """Offsets at the highest peaks of the cross-correlation of signal and force [s]."""
+    """Offsets at the highest peaks of the cross-correlation of signal and force, where abs(Z) falls if any [s]."""
     from scipy.signal import correlate, find_peaks
 
     rows, force, _, _ = rig.sound()
@@ -301,7 +300,7 @@ def _correlated(time: Real, signal: Real, rig: RigLog, within_s: float) -> list[
     theirs = _high_pass(np.interp(np.arange(rows[0], rows[-1], step), rows, force))
     if len(ours) < 4 or len(theirs) < 4:
         raise BadInput(f"{min(np.ptp(time), np.ptp(rows)):.3g} s to compare; expected at least {4 * step:g} s")
-    correlation = np.abs(correlate(ours, theirs, method="fft"))
+    correlation = correlate(ours, theirs, method="fft")
     lags = np.arange(-(len(theirs) - 1), len(ours))
     shared = np.minimum(np.minimum(len(ours), len(theirs)), np.minimum(lags + len(theirs), len(ours) - lags))
     offsets = time[0] - rows[0] + lags * step
@@ -311,9 +310,11 @@ def _correlated(time: Real, signal: Real, rig: RigLog, within_s: float) -> list[
             f"recording and rig's log do not overlap within {within_s:g} s: their clocks are "
             f"{time[0] - rows[0]:.6g} s apart"
         )
-    score = np.where(allowed, correlation / np.sqrt(np.maximum(shared, 1)), -1.0)
+    score = np.where(allowed, np.abs(correlation) / np.sqrt(np.maximum(shared, 1)), -1.0)
     edged = np.pad(score, 1, constant_values=-1.0)
     peaks = find_peaks(edged, height=_PEAK * score.max(), distance=max(round(_APART_S / step), 1))[0] - 1
+    falling = peaks[correlation[peaks] > 0]
+    peaks = falling if len(falling) else peaks
     return [float(offsets[k]) for k in peaks[np.argsort(-score[peaks])][:_PEAKS]]
 
 
@@ -324,8 +325,8 @@ def _high_pass(values: Real) -> Real:
     return np.asarray(values - uniform_filter1d(values, min(len(values), round(20 / _GRID_S)), mode="nearest"))
 
 
-def _responses(rig: RigLog) -> Callable[[Real], Real]:
-    """Terms of force and position in the fit, at any times of the rig's clock."""
+def _responses(rig: RigLog) -> tuple[Real, Real]:
+    """Rows of the rig's log [s], and the terms of force and position in the fit at each of them (n, k)."""
     rows, force, _, position = rig.sound()
     where = (position - position.mean()) / max(float(np.ptp(position)), 1e-9)
     least = 2 * float(np.median(np.diff(rows)))  # a faster relaxation and a late clock look alike in so few rows
@@ -334,17 +335,24 @@ def _responses(rig: RigLog) -> Callable[[Real], Real]:
     pressed = force > max(_LIFTED * force.max(), _CLEAR * noise)
     apart = np.cumsum(np.diff(pressed, prepend=False)) * 2 * np.ptp(force)  # raises each press above those before
     peak = np.maximum.accumulate(force + apart) - apart
-    bends = [share * force.max() for share in _BENDS]
-    way_back = np.where(pressed, np.maximum(peak - force - _CLEAR * noise, 0), 0)
+    back = np.where(pressed, np.maximum(peak - force - _CLEAR * noise, 0), 0)
+    powers = ((force, force**2, force**3), (1.0, where, where**2))
+    bent = (np.maximum(force - share * force.max(), 0.0) for share in _BENDS)
+    immediate = (*(a * b for a, b in product(*powers)), *bent, back, back * force, back * force**2)
+    return rows, np.column_stack([*immediate, *(term(rows) for term in slow)])
 
-    def responses(at: Real) -> Real:
-        f, x, back = (np.interp(at, rows, column) for column in (force, where, way_back))
-        powers = ((f, f * f, f * f * f), (1.0, x, x * x))  # products: ** takes five times as long
-        bent = (np.maximum(f - bend, 0.0) for bend in bends)
-        immediate = (*(a * b for a, b in product(*powers)), *bent, back, back * f, back * f * f)
-        return np.column_stack([*immediate, *(term(at) for term in slow)])
 
-    return responses
+def _averaged(time_s: Real, columns: Real) -> Callable[[Real], Real]:
+    """Means of columns (n, k) over ``_MEAN_S`` around any times, which have as little noise as a slow response."""
+    ends = np.concatenate([[time_s[0] - _MEAN_S], time_s, [time_s[-1] + _MEAN_S]])
+    level = np.vstack([columns[:1], columns, columns[-1:]])
+    area = np.vstack([0 * level[:1], np.cumsum((level[1:] + level[:-1]) / 2 * np.diff(ends)[:, None], axis=0)])
+
+    def means(at_s: Real) -> Real:
+        later, earlier = at_s + _MEAN_S / 2, at_s - _MEAN_S / 2
+        return np.column_stack([np.interp(later, ends, of) - np.interp(earlier, ends, of) for of in area.T]) / _MEAN_S
+
+    return means
 
 
 def _refined(time: Real, signal: Real, rig: RigLog, offset: float) -> Offset:
@@ -353,10 +361,12 @@ def _refined(time: Real, signal: Real, rig: RigLog, offset: float) -> Offset:
     half = max(float(np.ptp(time)) / 2, 1e-9)
     u = (time - middle) / half
     h = float(np.median(np.diff(rig.time_s[~rig.error]))) / 2
-    responses = _responses(rig)
+    rows, columns = _responses(rig)
+    responses, unaveraged = _averaged(rows, columns), signal
+    signal = _averaged(time, signal[:, None])(time)[:, 0]
     creep = [np.log1p((1 + u) * ratio / 2) for ratio in _CREEP]
     drift, skew = np.column_stack([np.ones_like(u), u, u**2, u**3, *creep]), 0.0
-    few = slice(None, None, max(1, len(time) // _FEW))
+    few, lag = slice(None, None, max(1, len(time) // _FEW)), max(1, round(_MEAN_S / float(np.median(np.diff(time)))))
 
     def misfit(by: float) -> float:
         model = np.hstack([drift[few], responses(time[few] - offset - by)])
@@ -375,23 +385,24 @@ def _refined(time: Real, signal: Real, rig: RigLog, offset: float) -> Offset:
         slope = -((responses(at + h) - responses(at - h)) / (2 * h)) @ of_force
         extended = np.hstack([model, slope[:, None], (slope * u * half)[:, None]])
         step = _least_squares(extended, residual)[-2:]
-        covariance = _covariance(extended, residual)
+        covariance = _covariance(extended, residual, lag)
         offset, skew = offset + float(np.clip(step[0], -h, h)), float(np.clip(skew + step[1], -MAX_SKEW, MAX_SKEW))
         if abs(step[0]) < 1e-3 * covariance[0, 0] ** 0.5 or abs(step[0]) < 1e-9:
             break
     error, skew_error = np.sqrt(np.diag(covariance))
     explained = float(np.var(fitted) / (np.var(fitted) + np.var(residual))) if np.var(signal) > 0 else 0.0
     significant = bool(abs(skew) > _SIGNIFICANT * skew_error)
-    by_chance = explained < _LEAST_SHARE or _fisher_f(signal, drift, terms, residual) < _LEAST_F
+    terms = np.column_stack([np.interp(at, rows, column) for column in columns.T])
+    by_chance = explained < _LEAST_SHARE or _fisher_f(unaveraged, drift, terms) < _LEAST_F
     return Offset(offset, float(error), skew if significant else 0.0, float(skew_error), middle, explained, by_chance)
 
 
-def _fisher_f(signal: Real, drift: Real, terms: Real, residual: Real) -> float:
+def _fisher_f(signal: Real, drift: Real, terms: Real) -> float:
     """Fisher's F of the immediate response to the force, beside drift and relaxation, which follow correlated noise."""
     slow = np.hstack([drift, terms[:, -len(_RELAXATION_S) :]])
-    without = signal - slow @ _least_squares(slow, signal)
+    without, residual = (signal - of @ _least_squares(of, signal) for of in (slow, np.hstack([drift, terms])))
     immediate = terms.shape[1] - len(_RELAXATION_S)
-    free = float(_independent(residual)) - slow.shape[1] - immediate
+    free = _independent(residual) - slow.shape[1] - immediate
     more = float(without @ without) / max(float(residual @ residual), 1e-300) - 1
     return float(more * free / immediate)
 
@@ -404,17 +415,17 @@ def _least_squares(model: Real, signal: Real) -> Real:
     return np.asarray(np.linalg.lstsq(scaled.T @ scaled, scaled.T @ signal, rcond=1e-13)[0] / size)
 
 
-def _covariance(model: Real, residual: Real) -> Real:
+def _covariance(model: Real, residual: Real, lag: int = 1) -> Real:
     """Covariance of the last two weights for correlated residuals."""
     variance = float((residual**2).sum()) / max(len(residual) - model.shape[1], 1)
-    variance *= len(residual) / _independent(residual)
+    variance *= len(residual) / _independent(residual, lag)
     return np.asarray(np.linalg.pinv(model.T @ model)[-2:, -2:] * variance)
 
 
-def _independent(residual: Real) -> float:
-    """Number of independent residuals of a first-order autoregressive process."""
-    count = len(residual)
-    rho = float((residual[1:] * residual[:-1]).sum() / max(float((residual**2).sum()), 1e-300))
+def _independent(residual: Real, lag: int = 1) -> float:
+    """Number of independent residuals of a first-order autoregressive process, by those a lag apart."""
+    count = len(residual) / lag
+    rho = float((residual[lag:] * residual[:-lag]).sum() / max(float((residual**2).sum()), 1e-300))
     rho = min(max(rho, 0.0), 1 - 1 / count)
     return count * (1 - rho) / (1 + rho)
 
@@ -508,7 +519,7 @@ def _best(recordings: Sequence[Recording], times: Sequence[Real], rig: RigLog, w
             faults.append(error)
     if not offsets:
         raise faults[0]
-    return _surest(offsets)
+    return min(offsets, key=lambda offset: (offset.by_chance, offset.offset_error_s))
 
 
 def _joined(recording: Recording, rig: RigLog, time: Real, offset: Offset) -> Joined:
