@@ -233,6 +233,25 @@ def test_hysteresis_of_two_known_ways():
         hysteresis(force[:200], values[:200])
 
 
+@pytest.mark.parametrize(
+    ("sign", "zero_n", "said", "rests"),
+    [(-1, 0.0, "the force goes down to -5", True), (1, 0.4, "the force is never below 0.3", False)],
+)
+def test_a_force_of_the_other_sign_or_off_its_zero_is_named_and_no_load_is_a_rest(sign, zero_n, said, rests):
+    source = Source("", "", rate_hz=70)
+    one = Recording(RUN.time_s, made.TONES_HZ, RUN.impedance_ohm, blank(len(ALL)), RecordingClock(), source)
+    time, told, position, force = made.rig_rows(MADE)
+    log = RigLog(time - made.EPOCH_S, told, position, sign * force + zero_n, np.zeros(len(time), bool))
+    worked = processed(one, log)
+    assert worked.pairs is None
+    assert said in worked.notes[-1]
+    z = worked.rest_ohm()
+    assert bool(len(z)) is rests
+    if rests:
+        truth = (RUN.clean_ohm * np.exp(RUN.drift))[RUN.force_n == 0]
+        np.testing.assert_allclose(np.log(z).mean(axis=0), np.log(truth).mean(axis=0), atol=2e-4)
+
+
 def slow_loads(period_s, count, power, lens, noise_n=0.001):
     """Up and down again in 12 s each, to 6 N, by a rig 2 s early; of a film with a lens of hysteresis."""
 

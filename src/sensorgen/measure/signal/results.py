@@ -198,9 +198,9 @@ def of_recording(worked: Processed, rig: RigLog | None, files: Iterable[str] = (
 
 
 def _at_rest(worked: Processed) -> Iterator[RestResult]:
-    """Mean and scatter of the valid samples at each frequency; nothing of fewer than two."""
+    """Mean and scatter of the valid samples with no force at each frequency; nothing of fewer than two."""
     one = worked.recording
-    z = one.impedance_ohm[one.valid()]
+    z = worked.rest_ohm()
     z = z[np.isfinite(z).all(axis=1)]
     if len(z) < 2:
         return
