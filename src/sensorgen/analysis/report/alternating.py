@@ -116,8 +116,8 @@ def _compared(rows: Sequence[AcRow]) -> list[AcRow]:
 
 
 def headline(rows: Sequence[AcRow]) -> Iterator[str]:
-    """Capacitance against the prediction, in one sentence."""
-    known = _compared(rows)
+    """Capacitance against the prediction, in one sentence; flagged values count where there are no others."""
+    known = _compared([row for row in rows if not row.flag]) or _compared(rows)
     if not known:
         return
     counts = Counter(row.frequency_hz for row in known)
