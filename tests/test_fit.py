@@ -72,6 +72,21 @@ def test_a_known_resistivity_and_leak_come_back(tmp_path):
     assert made.errors[0].after < made.errors[0].before
 
 
+def test_readings_of_electrodes_of_two_materials_are_no_resistivity_of_one(tmp_path):
+    (tmp_path / "two.yaml").write_text(
+        "shape: tri\nmaterials: {bottom_electrode: filaflex-conductive}\ntools: {filaflex-conductive: 1}\n"
+    )
+    names = [f"T{k}" for k in range(6)]
+    with Log(tmp_path / "log.db", create=True) as log, roughly_at_rest():
+        prints.bind(log, names, str(tmp_path / "two.yaml"))
+        log.add([notes.reading(name, "1.5k", "OL", log=log) for name in names])
+        made = fit(log, None, specimens=names)
+    assert not made.values
+    assert not made.groups
+    (why,) = (untold.why for untold in made.untold if untold.parameter == "resistivity_ohm_m along")
+    assert "etpu and filaflex-conductive: readings do not tell which" in why
+
+
 def test_the_interval_of_a_resistivity_is_as_wide_as_the_bounds_and_the_scatter():
     same = [AllowedValues(math.log(0.03), math.log(0.06), math.nan)] * 9
     found = resistivity(same, "etpu")
