@@ -217,7 +217,8 @@ _RELAXATION_S = (1.0, 2.0, 4.0, 8.0, 32.0)
 _PEAK, _PEAKS, _APART_S = 0.8, 6, 1.0  # of the correlation: share of the highest, number, and distance of those tried
 _AROUND_S, _FEW = np.linspace(-2.0, 2.0, 41), 4000  # of the search around each of them; samples for it
 _BENDS = (1 / 64, 1 / 16, 1 / 4)  # of the law, over the largest force
-_MEAN_S = 0.5  # over which signal and responses are averaged before they are compared
+_MEAN_S = (1e-3, 1.0)  # least and most over which signal and responses are averaged before they are compared
+_QUIET = 20.0  # times in which the force rises by its noise, that such a mean spans
 
 
 @dataclass(frozen=True)
@@ -325,8 +326,8 @@ def _high_pass(values: Real) -> Real:
     return np.asarray(values - uniform_filter1d(values, min(len(values), round(20 / _GRID_S)), mode="nearest"))
 
 
-def _responses(rig: RigLog) -> tuple[Real, Real]:
-    """Rows of the rig's log [s], and the terms of force and position in the fit at each of them (n, k)."""
+def _responses(rig: RigLog) -> tuple[Real, Real, float]:
+    """Rows of the rig's log [s], terms of the fit at each of them (n, k), and the time to average over [s]."""
     rows, force, _, position = rig.sound()
     where = (position - position.mean()) / max(float(np.ptp(position)), 1e-9)
     least = 2 * float(np.median(np.diff(rows)))  # a faster relaxation and a late clock look alike in so few rows
@@ -339,18 +340,20 @@ def _responses(rig: RigLog) -> tuple[Real, Real]:
     powers = ((force, force**2, force**3), (1.0, where, where**2))
     bent = (np.maximum(force - share * force.max(), 0.0) for share in _BENDS)
     immediate = (*(a * b for a, b in product(*powers)), *bent, back, back * force, back * force**2)
-    return rows, np.column_stack([*immediate, *(term(rows) for term in slow)])
+    fastest = np.abs(np.interp(rows + 1.0, rows, force) - force).max()  # in a second
+    mean_s = float(np.clip(_QUIET * noise / max(fastest, 1e-9), *_MEAN_S))
+    return rows, np.column_stack([*immediate, *(term(rows) for term in slow)]), mean_s
 
 
-def _averaged(time_s: Real, columns: Real) -> Callable[[Real], Real]:
-    """Means of columns (n, k) over ``_MEAN_S`` around any times, which have as little noise as a slow response."""
-    ends = np.concatenate([[time_s[0] - _MEAN_S], time_s, [time_s[-1] + _MEAN_S]])
+def _averaged(time_s: Real, columns: Real, mean_s: float) -> Callable[[Real], Real]:
+    """Means of columns (n, k) over a span around any times, which have as little noise as a slow response."""
+    ends = np.concatenate([[time_s[0] - mean_s], time_s, [time_s[-1] + mean_s]])
     level = np.vstack([columns[:1], columns, columns[-1:]])
     area = np.vstack([0 * level[:1], np.cumsum((level[1:] + level[:-1]) / 2 * np.diff(ends)[:, None], axis=0)])
 
     def means(at_s: Real) -> Real:
-        later, earlier = at_s + _MEAN_S / 2, at_s - _MEAN_S / 2
-        return np.column_stack([np.interp(later, ends, of) - np.interp(earlier, ends, of) for of in area.T]) / _MEAN_S
+        later, earlier = at_s + mean_s / 2, at_s - mean_s / 2
+        return np.column_stack([np.interp(later, ends, of) - np.interp(earlier, ends, of) for of in area.T]) / mean_s
 
     return means
 
@@ -361,12 +364,12 @@ def _refined(time: Real, signal: Real, rig: RigLog, offset: float) -> Offset:
     half = max(float(np.ptp(time)) / 2, 1e-9)
     u = (time - middle) / half
     h = float(np.median(np.diff(rig.time_s[~rig.error]))) / 2
-    rows, columns = _responses(rig)
-    responses, unaveraged = _averaged(rows, columns), signal
-    signal = _averaged(time, signal[:, None])(time)[:, 0]
+    rows, columns, mean_s = _responses(rig)
+    responses, unaveraged = _averaged(rows, columns, mean_s), signal
+    signal = _averaged(time, signal[:, None], mean_s)(time)[:, 0]
     creep = [np.log1p((1 + u) * ratio / 2) for ratio in _CREEP]
     drift, skew = np.column_stack([np.ones_like(u), u, u**2, u**3, *creep]), 0.0
-    few, lag = slice(None, None, max(1, len(time) // _FEW)), max(1, round(_MEAN_S / float(np.median(np.diff(time)))))
+    few, lag = slice(None, None, max(1, len(time) // _FEW)), max(1, round(mean_s / float(np.median(np.diff(time)))))
 
     def misfit(by: float) -> float:
         model = np.hstack([drift[few], responses(time[few] - offset - by)])
