@@ -84,7 +84,7 @@ def test_readings_of_electrodes_of_two_materials_are_no_resistivity_of_one(tmp_p
     assert not made.values
     assert not made.groups
     (why,) = (untold.why for untold in made.untold if untold.parameter == "resistivity_ohm_m along")
-    assert "etpu and filaflex-conductive: readings do not tell which" in why
+    assert "etpu and filaflex-conductive: not determined which" in why
 
 
 def test_the_interval_of_a_resistivity_is_as_wide_as_the_bounds_and_the_scatter():

@@ -174,7 +174,7 @@ def _fitted(
     electrodes, film = _electrodes(comparison), design.slot("film")[0].name
     readings, by_ac = dict(data.readings), estimates.along(fits, data.unsound)
     along = [*(readings | by_ac).values()]
-    mixed = f"electrodes of {' and '.join(electrodes)}: readings do not tell which was measured; fit those of one alone"
+    mixed = f"electrodes of {' and '.join(electrodes)}: not determined which was measured; fit those of one alone"
     results = [
         Untold(f"{estimates.RESISTIVITY} along", mixed)
         if len(electrodes) > 1
