@@ -90,13 +90,11 @@ def _runs(log: Log, row: BenchRun, left_out: list[str]) -> Iterator[_Run]:
             part, joined_all(part, rig) if rig is not None else [None] * len(part), strict=True
         ):
             result = processed(recording, with_rig, remove_drift=False)
-            left_out += [f"recording {row.number}: {note}" for note in (result.pairs.left_out if result.pairs else ())]
+            left_out += [f"recording {row.number}: {note}" for note in result.left_out]
             pairs = result.pairs if result.by_force else None
             if with_rig is not None and np.isnan(with_rig.clocks.offset_error_s):
                 left_out.append(f"recording {row.number}: {with_rig.clocks.words()}")
                 pairs = pairs if np.isfinite(recording.clock.epoch_s) else None
-            elif with_rig is not None and not pairs:
-                left_out.append(f"recording {row.number}: {result.notes[-1]}")
             yield _Run(recording.tones_hz, pairs, *_rest(result.rest_ohm()))
 
 

@@ -172,8 +172,8 @@ def principal_component(impedance_ohm: Complex) -> Real:
     component = np.zeros_like(t)
     for weight, channel in zip(directions[0], channels, strict=True):
         component += weight * channel
-    rises = component @ np.log(np.abs(impedance_ohm)).sum(axis=1) > 0
-    return -component if rises else component
+    rise = float(component @ np.log(np.abs(impedance_ohm)).sum(axis=1))
+    return np.asarray(component * np.copysign(1.0, -rise))
 
 
 def relaxation(time_s: Real, force_n: Real, tau_s: float) -> Callable[[Real], Real]:

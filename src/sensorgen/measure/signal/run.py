@@ -46,6 +46,11 @@ class Processed:
     by_force: bool
     notes: tuple[str, ...]
 
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Presses that were left out, or why the rig's force shows none."""
+        return self.pairs.left_out if self.pairs else self.notes[-1:] if self.by_force else ()
+
     def rest_ohm(self) -> Complex:
         """Readings with nothing on the sensor (k, m): before presses, else the valid ones without a force [ohm]."""
         if self.pairs:
