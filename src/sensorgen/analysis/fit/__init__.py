@@ -175,10 +175,9 @@ def _fitted(
     readings, by_ac = dict(data.readings), estimates.along(fits, data.unsound)
     along = [*(readings | by_ac).values()]
     mixed = f"electrodes of {' and '.join(electrodes)}: not determined which was measured; fit those of one alone"
+    one = estimates.resistivity(along, electrodes[0], 1 if by_ac else estimates.LEAST)
     results = [
-        Untold(f"{estimates.RESISTIVITY} along", mixed)
-        if len(electrodes) > 1
-        else estimates.resistivity(along, electrodes[0], 1 if by_ac else estimates.LEAST),
+        one if len(electrodes) == 1 else Untold(f"{estimates.RESISTIVITY} along", mixed),
         *([estimates.leak([*readings.values()], film, seed)] if readings else []),
         *estimates.values(fits),
     ]

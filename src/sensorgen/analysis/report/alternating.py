@@ -111,13 +111,14 @@ def _predicted(of: Predicted | None, frequency_hz: float) -> tuple[_Range, _Rang
 
 
 def _compared(rows: Sequence[AcRow]) -> list[AcRow]:
-    """Rows whose capacitance can be compared with a prediction."""
-    return [row for row in rows if isfinite(row.c_ratio) and row.c_ratio > 0]
+    """Rows whose capacitance can be compared with a prediction; flagged ones where there are no others."""
+    known = [row for row in rows if isfinite(row.c_ratio) and row.c_ratio > 0]
+    return [row for row in known if not row.flag] or known
 
 
 def headline(rows: Sequence[AcRow]) -> Iterator[str]:
-    """Capacitance against the prediction, in one sentence; flagged values count where there are no others."""
-    known = _compared([row for row in rows if not row.flag]) or _compared(rows)
+    """Capacitance against the prediction, in one sentence."""
+    known = _compared(rows)
     if not known:
         return
     counts = Counter(row.frequency_hz for row in known)
