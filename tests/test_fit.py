@@ -72,6 +72,21 @@ def test_a_known_resistivity_and_leak_come_back(tmp_path):
     assert made.errors[0].after < made.errors[0].before
 
 
+def test_readings_of_electrodes_of_two_materials_are_no_resistivity_of_one(tmp_path):
+    (tmp_path / "two.yaml").write_text(
+        "shape: tri\nmaterials: {bottom_electrode: filaflex-conductive}\ntools: {filaflex-conductive: 1}\n"
+    )
+    names = [f"T{k}" for k in range(6)]
+    with Log(tmp_path / "log.db", create=True) as log, roughly_at_rest():
+        prints.bind(log, names, str(tmp_path / "two.yaml"))
+        log.add([notes.reading(name, "1.5k", "OL", log=log) for name in names])
+        made = fit(log, None, specimens=names)
+    assert not made.values
+    assert not made.groups
+    (why,) = (untold.why for untold in made.untold if untold.parameter == "resistivity_ohm_m along")
+    assert "etpu and filaflex-conductive: not determined which" in why
+
+
 def test_the_interval_of_a_resistivity_is_as_wide_as_the_bounds_and_the_scatter():
     same = [AllowedValues(math.log(0.03), math.log(0.06), math.nan)] * 9
     found = resistivity(same, "etpu")
@@ -298,9 +313,19 @@ def test_few_prints_are_less_sure_than_their_scatter():
     """Student, with a prior of 10 % that is worth three prints; one print is never the material."""
     mean, error = _together([(1.0, 1e-9), (1.2, 1e-9)], ["a", "b"])
     scatter = ((3 * 0.1**2 + 2 * 0.1**2) / 4) ** 0.5
-    assert (mean, 2 * error) == (pytest.approx(1.1), pytest.approx(stats.t.ppf(0.975, 4) * scatter / 2**0.5))
+    assert (mean, 2 * error) == (pytest.approx(1.1), pytest.approx(stats.t.ppf(0.975, 4) * scatter * 1.5**0.5))
     assert _together([(1.0, 0.3), (1.0, 0.4)], ["a", "b"]) == (1.0, pytest.approx(0.25))
-    assert _together([(1.0, 1e-9)], ["a"]) == (1.0, pytest.approx(stats.t.ppf(0.975, 3) * 0.1 / 2))
+    assert _together([(1.0, 1e-9)], ["a"]) == (1.0, pytest.approx(stats.t.ppf(0.975, 3) * 0.1 / 2**0.5))
+
+
+def test_an_interval_holds_95_of_100_further_prints():
+    """Eight prints that scatter by 15 %, each known to 4 %, and a ninth."""
+    rng, inside = np.random.default_rng(2), []
+    for _ in range(600):
+        *eight, ninth = 0.15 * rng.standard_normal(9)
+        mean, error = _together([(at + 0.04 * rng.standard_normal(), 0.04) for at in eight], list("abcdefgh"))
+        inside.append(abs(ninth - mean) < 2 * error)
+    assert 0.92 < np.mean(inside) < 0.98
 
 
 def test_specimens_of_one_plate_are_one_print():

@@ -282,6 +282,16 @@ def test_meters_alone_calibrate_what_they_can(bench):
     assert "were withdrawn or corrected" in bench("invert", "S2", "none.csv").line
 
 
+def test_a_negative_inductance_is_what_a_meter_shows_of_a_capacitor(bench, tmp_path):
+    c, d = meter(TRUTH, 1.1e3)
+    inductance = -1 / ((2 * np.pi * 1.1e3) ** 2 * c * 1e-12 * (1 + d**2))
+    (tmp_path / "ls.csv").write_text(f"Frequency (Hz),Ls (H),Q\n1100,{inductance:.8g},{1 / d:.8g}\n")
+    assert bench("log", "specimen", "S2", "--design", "mine.yaml").code == 0
+    assert "doubt" not in bench("log", "import", "ls.csv", "--specimen", "S2", "--instrument", "HP 4284A").out
+    known = told(json.loads(bench("calibrate", "S2", "--drawn", "--json").out), "capacitance")
+    assert known["lower"] < 64.256829 * np.exp(TRUTH.capacitance) < known["upper"] < 1.1 * known["lower"]
+
+
 def test_readings_that_no_specimen_has_are_named(bench):
     """A phase of the wrong sign, a capacitance in F for pF; a remark that is no reading changes nothing."""
     assert bench("log", "specimen", "S2", "--design", "mine.yaml").code == 0

@@ -82,8 +82,11 @@ def test_readings_alone_come_back(full, tmp_path, form):
     exchange.export(full, tmp_path / f"r.{form}")
     with Log(tmp_path / "new.db", create=True) as new:
         exchange.import_file(new, tmp_path / f"r.{form}", {})
-        alone, both = new.readings(superseded=True), full.readings(superseded=True)
-        assert as_imported({0: alone}) == as_imported({0: both})
+        alone, (unbedded, *others) = new.readings(superseded=True), full.readings(superseded=True)
+        assert unbedded.uid == "unbedded"
+        moved = [dataclasses.replace(one, number=one.number - 1) for one in others]
+        assert as_imported({0: alone}) == as_imported({0: moved})
+        assert [one.uid for one in new.readings()] == [one.uid for one in full.readings()]  # none that was withdrawn
 
 
 def test_parquet_holds_types_that_others_read(full, tmp_path):
@@ -91,10 +94,10 @@ def test_parquet_holds_types_that_others_read(full, tmp_path):
 
     exchange.export(full, tmp_path / "r.parquet")
     table = pyarrow.parquet.read_table(tmp_path / "r.parquet")
-    assert table.column("y_ohm").to_pylist()[2] == [1234.56789, math.inf]
-    assert table.column("baked").to_pylist()[1:3] == [True, False]
-    assert table.column("film_mm").to_pylist()[1:3] == [0.0, 0.3333]
-    assert table.column("remark").to_pylist()[2 : len(REMARKS) + 2] == REMARKS
+    assert table.column("y_ohm").to_pylist()[1] == [1234.56789, math.inf]
+    assert table.column("baked").to_pylist()[:2] == [True, False]
+    assert table.column("film_mm").to_pylist()[:2] == [0.0, 0.3333]
+    assert table.column("remark").to_pylist()[1 : len(REMARKS) + 1] == REMARKS
 
 
 def test_no_cell_is_a_formula(full, tmp_path):
@@ -202,4 +205,4 @@ def test_without_pyarrow_parquet_is_refused_and_csv_is_not(full, tmp_path, monke
     monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
     with pytest.raises(MissingValue, match=r"pip install 'sensorgen\[parquet\]', or export CSV"):
         exchange.export(full, tmp_path / "r.parquet")
-    assert exchange.export(full, tmp_path / "r.csv") == len(REMARKS) + 3
+    assert exchange.export(full, tmp_path / "r.csv") == len(REMARKS) + 2

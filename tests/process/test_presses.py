@@ -233,19 +233,44 @@ def test_hysteresis_of_two_known_ways():
         hysteresis(force[:200], values[:200])
 
 
-def test_hysteresis_is_no_late_clock_and_its_error_has_that_of_the_clock():
-    def force(time_s):
-        """Up and down again in 12 s each, to 6 N."""
-        return 6 * np.clip(1 - np.abs(time_s % 40 - 22) / 12, 0, 1)
+@pytest.mark.parametrize(
+    ("sign", "zero_n", "said", "rests"),
+    [(-1, 0.0, "the force goes down to -5", True), (1, 0.4, "the force is never below 0.3", False)],
+)
+def test_a_force_of_the_other_sign_or_off_its_zero_is_named_and_no_load_is_a_rest(sign, zero_n, said, rests):
+    source = Source("", "", rate_hz=70)
+    one = Recording(RUN.time_s, made.TONES_HZ, RUN.impedance_ohm, blank(len(ALL)), RecordingClock(), source)
+    time, told, position, force = made.rig_rows(MADE)
+    log = RigLog(time - made.EPOCH_S, told, position, sign * force + zero_n, np.zeros(len(time), bool))
+    worked = processed(one, log)
+    assert worked.pairs is None
+    assert said in worked.notes[-1]
+    z = worked.rest_ohm()
+    assert bool(len(z)) is rests
+    if rests:
+        truth = (RUN.clean_ohm * np.exp(RUN.drift))[RUN.force_n == 0]
+        np.testing.assert_allclose(np.log(z).mean(axis=0), np.log(truth).mean(axis=0), atol=2e-4)
 
-    t, rows, rng = np.arange(0, 160, 0.02), np.arange(0, 160, 0.04), np.random.default_rng(0)
-    share = force(t) / 6
-    share += 0.2 * np.where(t % 40 > 22, 4 * share * (1 - share), 0)
+
+def slow_loads(period_s, count, power, lens, noise_n=0.001):
+    """Up and down again in 12 s each, to 6 N, by a rig 2 s early; of a film with a lens of hysteresis."""
+
+    def force(time_s):
+        return 6 * np.clip(1 - np.abs(time_s % period_s - 17) / 12, 0, 1)
+
+    end = period_s * count
+    t, rows, rng = np.arange(0, end, 0.02), np.arange(0, end, 0.04), np.random.default_rng(0)
+    share = (force(t) / 6) ** power
+    share += lens * np.where(t % period_s > 17, 4 * share * (1 - share), 0)
     noise = 2e-4 * (rng.standard_normal(len(t)) + 1j * rng.standard_normal(len(t)))
     z = ((1000 - 5000j) * (1 - 0.06 * share) * (1 + noise))[:, None]
     one = Recording(t, np.array([1.1e3]), z, blank(len(t)), RecordingClock(), Source("", "", rate_hz=50))
-    measured = force(rows) + 0.001 * rng.standard_normal(len(rows))
-    log = RigLog(rows - 2.0, force(rows), 50 + 0 * rows, measured, np.zeros(len(rows), bool))
+    measured = force(rows) + noise_n * rng.standard_normal(len(rows))
+    return one, RigLog(rows - 2.0, force(rows), 50 + 0 * rows, measured, np.zeros(len(rows), bool))
+
+
+def test_hysteresis_is_no_late_clock_and_its_error_has_that_of_the_clock():
+    one, log = slow_loads(40, 4, power=1, lens=0.2)
     clocks = joined(one, log).clocks
     assert clocks.offset_s == pytest.approx(2, abs=4 * clocks.offset_error_s)
     assert clocks.offset_error_s < 0.01
@@ -256,6 +281,14 @@ def test_hysteresis_is_no_late_clock_and_its_error_has_that_of_the_clock():
         assert way.share[1] == pytest.approx(0.2 / (1 - 0.2 / 6), abs=4 * way.error[1])
     for way in of_presses(replace(worked, clock_error_s=0.1)).ways.values():  # both ways move by 0.05 N
         assert way.error[1] == pytest.approx(2 * 0.05 / 5.8, rel=0.25)
+
+
+@pytest.mark.parametrize(("lens", "noise_n"), [(0.0, 0.001), (0.1, 0.001), (0.0, 0.03)])
+def test_equal_loads_of_a_film_that_is_steep_at_first_tell_its_hysteresis(lens, noise_n):
+    one, log = slow_loads(29, 8, 0.75, lens, noise_n)  # as like itself half a period late as in time
+    assert joined(one, log).clocks.offset_s == pytest.approx(2, abs=0.04)  # a row of the rig
+    for way in of_presses(processed(one, log, law="line")).ways.values():
+        assert way.share[1] == pytest.approx(lens / (1 - (0.2 / 6) ** 0.75), abs=0.015)
 
 
 def test_a_surface_is_straight_between_its_presses_and_blank_beyond():

@@ -203,3 +203,10 @@ def test_three_presses_in_noise_that_wanders_tell_the_offset(tmp_path):
     log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(MADE[:3], 3.217)))
     found = joined(recording(lived), log)
     assert found.clocks.offset_s == pytest.approx(3.247, abs=0.02)
+
+
+def test_rows_a_second_apart_tell_the_offset_though_no_fast_relaxation(tmp_path):
+    many = made.presses(25, seed=2, dwell_s=3.0)
+    log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(many, 2.0, rate_hz=1)))
+    found = joined(recording(made.run(many, rate_hz=35)), log)
+    assert found.clocks.offset_s == pytest.approx(2.03, abs=0.15)

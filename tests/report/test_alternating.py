@@ -62,6 +62,12 @@ def test_a_reading_stands_beside_the_stored_prediction(logged, design):
     assert any(text.startswith("Capacitance of S1 at 10.1kHz: measured 60 ± 0.") for text in made.headline)
 
 
+def test_the_headline_is_of_values_that_the_meter_can_measure(logged):
+    made, _ = logged(S1=("HP 4284A", {"Cp": ["50pF@100Hz", "60pF@10.1kHz"], "D": ["0.02@100Hz", "0.02@10.1kHz"]}))
+    assert [row.flag for row in rows(made)] == ["outside the range of HP 4284A", ""]
+    assert any(text.startswith("Capacitance of S1 at 10.1kHz: measured 60 ± 0.") for text in made.headline)
+
+
 def test_scatter_and_stated_uncertainty_add_in_squares(logged):
     made, _ = logged(S1=("", {"Cp": ["59/60/61±0.5pF@1kHz"]}))
     (row,) = rows(made)

@@ -164,10 +164,10 @@ class Documented(Protocol):
 def shown(cell: Cell, digits: int = DIGITS) -> str:
     """A cell for people; no exponent from 0.0001 to a million.
 
-    >>> [shown(v) for v in (None, float("inf"), 1234.5678, 12345.678, 7, True, "a")]
-    ['–', '∞', '1235', '12350', '7', 'yes', 'a']
+    >>> [shown(v) for v in (None, float("nan"), float("inf"), 1234.5678, 12345.678, 7, True, "a")]
+    ['–', '–', '∞', '1235', '12350', '7', 'yes', 'a']
     """
-    if cell is None:
+    if cell is None or cell != cell:
         return "–"
     if isinstance(cell, str):
         return cell

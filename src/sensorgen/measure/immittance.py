@@ -32,7 +32,7 @@ UNITS: Mapping[str, str] = MappingProxyType({
 })  # fmt: skip
 QUANTITIES = frozenset(UNITS)
 NO_VALUE = 9.9e37  # SCPI 1999, 7.2.1.4: what an instrument sends for infinity
-NEVER_NEGATIVE = ("R", "Z", "G", "Y", "Cp", "Cs", "Lp", "Ls", "Rp", "D", "Q")  # of a passive specimen
+NEVER_NEGATIVE = ("R", "Z", "G", "Y", "Cp", "Cs", "Rp", "D", "Q")  # of a capacitor; its inductance always is
 _EXAMPLES = {"Cp": "12.3pF@1kHz", "Cs": "12.3pF@1kHz", "D": "0.02@1kHz", "phase": "-88deg@1kHz"}
 _SPELLINGS = {
     "f": "F", "farad": "F", "Ω": "ohm", "\u03c9": "ohm", "\u2126": "ohm", "ohms": "ohm", "r": "ohm", "°": "deg",

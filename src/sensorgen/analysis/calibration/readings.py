@@ -19,7 +19,6 @@ from sensorgen.measure.immittance import NEVER_NEGATIVE, pair, quantity_of
 from sensorgen.measure.log import BenchRun, Log, Reading
 from sensorgen.measure.log.bench import read_again
 from sensorgen.measure.recording import joined_all
-from sensorgen.measure.recording.samples import Recording
 from sensorgen.measure.signal.presses import Pairs
 from sensorgen.measure.signal.run import processed
 from sensorgen.prediction.calibration.fitting import Data, MeterReadings
@@ -91,12 +90,12 @@ def _runs(log: Log, row: BenchRun, left_out: list[str]) -> Iterator[_Run]:
             part, joined_all(part, rig) if rig is not None else [None] * len(part), strict=True
         ):
             result = processed(recording, with_rig, remove_drift=False)
-            left_out += [f"recording {row.number}: {note}" for note in (result.pairs.left_out if result.pairs else ())]
+            left_out += [f"recording {row.number}: {note}" for note in result.left_out]
             pairs = result.pairs if result.by_force else None
             if with_rig is not None and np.isnan(with_rig.clocks.offset_error_s):
                 left_out.append(f"recording {row.number}: {with_rig.clocks.words()}")
                 pairs = pairs if np.isfinite(recording.clock.epoch_s) else None
-            yield _Run(recording.tones_hz, pairs, *_rest(result.recording, result.pairs))
+            yield _Run(recording.tones_hz, pairs, *_rest(result.rest_ohm()))
 
 
 def nothing_recorded() -> Data:
@@ -105,9 +104,8 @@ def nothing_recorded() -> Data:
     return Data.unread(no_presses(), np.zeros(m), rest_noise=np.full(m, _UNMEASURED))
 
 
-def _rest(recording: Recording, pairs: Pairs | None) -> tuple[Complex, Real]:
-    """Mean reading with nothing on the sensor, and its relative standard error."""
-    z = pairs.before_ohm if pairs else recording.impedance_ohm[recording.valid()]
+def _rest(z: Complex) -> tuple[Complex, Real]:
+    """Mean of readings with nothing on the sensor, and its relative standard error."""
     if not len(z):
         raise BadInput("no reading at rest; expected one or more")
     mean = z.mean(axis=0)

@@ -90,7 +90,8 @@ def fit(
     by_shape = by_key(
         (f"{row.reading.shape} {row.reading.words.axes}".strip(), (reading, usable(row))) for row, reading in allowing
     )
-    groups = tuple(estimates.by_group(by_shape, design.slot("top_electrode")[0].name))
+    electrodes = _electrodes(comparison)
+    groups = tuple(estimates.by_group(by_shape if len(electrodes) == 1 else {}, electrodes[0]))
     return Fit(
         iteration, specimens, seed, tuple(values), tuple(untold), errors, len(names) - len(apart),
         tuple(sorted(apart)), tuple(left_out), _fingerprint(log, (iteration, specimens)), groups=groups,
@@ -170,10 +171,13 @@ def _fitted(
         estimates.of_specimen(one, print_, Movable(comparison.bodies[comparison.names[one.specimen]]))
         for one, print_ in data.measured
     ]
-    electrode, film = design.slot("top_electrode")[0].name, design.slot("film")[0].name
+    electrodes, film = _electrodes(comparison), design.slot("film")[0].name
     readings, by_ac = dict(data.readings), estimates.along(fits, data.unsound)
+    along = [*(readings | by_ac).values()]
+    mixed = f"electrodes of {' and '.join(electrodes)}: not determined which was measured; fit those of one alone"
+    one = estimates.resistivity(along, electrodes[0], 1 if by_ac else estimates.LEAST)
     results = [
-        estimates.resistivity([*(readings | by_ac).values()], electrode, 1 if by_ac else estimates.LEAST),
+        one if len(electrodes) == 1 else Untold(f"{estimates.RESISTIVITY} along", mixed),
         *([estimates.leak([*readings.values()], film, seed)] if readings else []),
         *estimates.values(fits),
     ]
@@ -184,6 +188,12 @@ def _fitted(
             best[one.material, one.quantity] = min(one, before, key=lambda value: value.high / value.low)
     open_ = {u.parameter: u for u in reversed(results) if isinstance(u, Untold) and not _is_told(u, best)}
     return list(best.values()), [_ACROSS, *open_.values()]
+
+
+def _electrodes(comparison: Comparison) -> list[str]:
+    """Materials of all electrodes."""
+    parts = ("top_electrode", "bottom_electrode")
+    return sorted({body.design.slot(part)[0].name for body in comparison.bodies.values() for part in parts})
 
 
 def _is_told(untold: Untold, values: Iterable[tuple[str, str]]) -> bool:

@@ -421,12 +421,12 @@ def _modulus(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
 
 
 def _of_prints(pairs: Sequence[tuple[OfSpecimen, Estimate]], usual: float = _BETWEEN) -> Estimate:
-    """Mean of specimens' estimates over their prints."""
+    """Mean of specimens' estimates over their prints, and the error of it for one more print."""
     return _together([estimate for _, estimate in pairs], [fit.print_ for fit, _ in pairs], usual)
 
 
 def _together(estimates: Sequence[Estimate], prints: Sequence[str], usual: float = _BETWEEN) -> Estimate:
-    """Mean over prints, and its standard error from the errors or from the scatter between prints, whichever is more.
+    """Mean over prints, and its error for one more print: by the errors or by the scatter of prints, whichever is more.
 
     Specimens of one plate count as one print: they share its conditions. Few
     prints tell their own scatter badly: a prior stands in for it, and it counts as much more as Student's interval is
@@ -441,7 +441,7 @@ def _together(estimates: Sequence[Estimate], prints: Sequence[str], usual: float
     degrees = _WEIGHT + count - 1
     scatter = sqrt((_WEIGHT * usual**2 + float(((at - at.mean()) ** 2).sum())) / degrees)
     wider = float(stdtrit(degrees, (1 + LEVEL) / 2)) / _SURE
-    return float(at.mean()), max(own, wider * scatter / sqrt(count))
+    return float(at.mean()), max(own, wider * scatter * sqrt(1 + 1 / count))
 
 
 def _permittivity(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
@@ -463,7 +463,7 @@ def _permittivity(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
         return Untold(PERMITTIVITY, "no reading of a specimen depends on it")
     at, between = _of_prints(pairs)
     error = between + open_  # bounds of a model do not average out, and prints scatter about their ends too
-    note = f"Im Z of {_specimens(len(pairs))}; the interval holds the bounds of the cell's model"
+    note = f"Im Z of {_specimens(len(pairs))}; the interval holds 95 % of prints and the bounds of the cell's model"
     return _value(film, PERMITTIVITY, (at, error), note, len(pairs))
 
 

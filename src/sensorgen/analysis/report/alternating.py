@@ -111,8 +111,9 @@ def _predicted(of: Predicted | None, frequency_hz: float) -> tuple[_Range, _Rang
 
 
 def _compared(rows: Sequence[AcRow]) -> list[AcRow]:
-    """Rows whose capacitance can be compared with a prediction."""
-    return [row for row in rows if isfinite(row.c_ratio) and row.c_ratio > 0]
+    """Rows whose capacitance can be compared with a prediction; flagged ones where there are no others."""
+    known = [row for row in rows if isfinite(row.c_ratio) and row.c_ratio > 0]
+    return [row for row in known if not row.flag] or known
 
 
 def headline(rows: Sequence[AcRow]) -> Iterator[str]:

@@ -60,7 +60,7 @@ def kind_of(names: Iterable[str]) -> type[Entry] | None:
 
 
 def export(log: Log, place: Path) -> int:
-    """Write readings to a ``.csv`` or ``.parquet`` file, or the whole log to a new folder.
+    """Write readings that are not withdrawn to a ``.csv`` or ``.parquet`` file, or the whole log to a new folder.
 
     Parameters
     ----------
@@ -83,7 +83,8 @@ def export(log: Log, place: Path) -> int:
     """
     file_format = place.suffix.lower().removeprefix(".")
     if file_format in FORMATS:
-        return _write_table(log, Reading, place, file_format)
+        used = (row for row in log.entries(Reading, superseded=True) if not log.withdrawn(row))
+        return _write_table(used, Reading, place, file_format)
     if place.suffix or os.path.lexists(place):
         raise BadInput(
             f"cannot export to {str(place)!r}; expected a .csv or .parquet file, or a folder that is not there"
@@ -92,7 +93,10 @@ def export(log: Log, place: Path) -> int:
     try:
         with store.writing(place, "cannot export to"):
             (part / "files").mkdir(parents=True)
-            rows = sum(_write_table(log, kind, part / f"{name}.csv", "csv") for kind, name in FILES.items())
+            rows = sum(
+                _write_table(log.entries(kind, superseded=True), kind, part / f"{name}.csv", "csv")
+                for kind, name in FILES.items()
+            )
             for file in log.entries(RawFile):
                 shutil.copyfile(files.place(log.files, file), part / "files" / file.uid)
             part.rename(place)
@@ -102,8 +106,7 @@ def export(log: Log, place: Path) -> int:
             shutil.rmtree(part)
 
 
-def _write_table(log: Log, kind: type[Entry], path: Path, file_format: str) -> int:
-    rows = log.entries(kind, superseded=True)
+def _write_table(rows: Iterable[Entry], kind: type[Entry], path: Path, file_format: str) -> int:
     if file_format == "parquet":
         table = list(rows)
         store.replace(path, parquet(kind, table))

@@ -477,12 +477,12 @@ class Log(AbstractContextManager["Log", None]):
             f"conflict: {word(kind)}s {row[2]} and {other} correct the same row; {other} counts: withdraw one of them"
             for kind in (Reading, BenchRun)
             for *row, other in self._rows(sql, [NAMES[kind]])
-            if not self._withdrawn(self._row(*row))
+            if not self.withdrawn(self._row(*row))
         ]
 
-    def _withdrawn(self, entry: Entry) -> bool:
+    def withdrawn(self, entry: Entry) -> bool:
         """Test whether a row, or its last correction, is withdrawn."""
-        return any(isinstance(later, Withdrawal) or self._withdrawn(later) for later in self.superseding(entry))
+        return any(isinstance(later, Withdrawal) or self.withdrawn(later) for later in self.superseding(entry))
 
     def _with_print(self, entry: Reading | BenchRun) -> Reading | BenchRun:
         """Entry with batch and design of the specimen's latest print."""

@@ -46,7 +46,7 @@ def recordings(path: Path, columns: Mapping[str, str]) -> Iterator[tuple[Recordi
 
     with readings(str(path), columns, (TIME, STAMP, CLIPPED, VALID)) as file:
         if not {TIME, STAMP} & set(file.numbers):
-            message = f"no column {TIME} and none {STAMP} (seconds since 1970); name it with a map of columns"
+            message = f"no column {TIME} and none {STAMP} (seconds since 1970); --column {TIME}=NAME says which it is"
             raise BadInput(f"{path}: {message}")
         if len(file.frequency_hz) > MOST_TONES:
             raise BadInput(f"{path}: {len(file.frequency_hz)} frequencies; expected up to {MOST_TONES}")

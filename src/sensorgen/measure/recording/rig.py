@@ -4,13 +4,16 @@ The sensor responds to the force, so that the recording is fitted by
 
 .. math::
    y(t) = \sum_{i=0}^{3} c_i t^i + \sum_{i=1}^{2} b_i \ln(1 + t / \tau_i) + \sum_{i=1}^{3} \sum_{j=0}^{2} c_{ij} F^i x^j
-          + (\hat F - F) \sum_{i=0}^{2} h_i F^i + \sum_{i=1}^{4} d_i \int_0^t F(s)\, e^{-(t - s)/T_i} \frac{ds}{T_i}
+          + \sum_{i=1}^{3} e_i (F - F_i)_+ + (\hat F - F) \sum_{i=0}^{2} h_i F^i
+          + \sum_{i=1}^{5} d_i \int_0^t F(s)\, e^{-(t - s)/T_i} \frac{ds}{T_i}
 
 with F and x shifted by the offset, y the principal component of ln Z, creep with time constants of a tenth and a
-hundredth of the run, and relaxation times T from one second to a minute: without them a slow film would count as a late
-clock, and hysteresis without the terms of the largest force of the press so far, :math:`\hat F`. A cross-correlation
-over all offsets gives the start, then a search around it, then Gauss-Newton. The standard error is that of the fit,
-with the number of independent samples.
+hundredth of the run, and relaxation times T from one second to half a minute: without them a slow film would count as
+a late clock, as hysteresis without the terms of the largest force of the press so far, :math:`\hat F`, and a law that
+is steep at small forces without the bends at :math:`F_i`. A cross-correlation over all offsets gives the starts, its
+highest peaks, those where a press lowers abs(Z) if there are any: equal presses resemble themselves half a period late,
+too. From each follow a search and Gauss-Newton; the best fit counts. The standard error is that of the fit, with the
+number of independent samples.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -137,7 +140,7 @@ _ROUNDING = 1e-12  # of ln Z: a smaller spread is no signal
 
 
 def principal_component(impedance_ohm: Complex) -> Real:
-    """First principal component of ln Z in units of its noise, without linear trend.
+    """First principal component of ln Z in units of its noise, without linear trend; it rises as abs(Z) falls.
 
     Parameters
     ----------
@@ -169,7 +172,8 @@ def principal_component(impedance_ohm: Complex) -> Real:
     component = np.zeros_like(t)
     for weight, channel in zip(directions[0], channels, strict=True):
         component += weight * channel
-    return component
+    rise = float(component @ np.log(np.abs(impedance_ohm)).sum(axis=1))
+    return np.asarray(component * np.copysign(1.0, -rise))
 
 
 def relaxation(time_s: Real, force_n: Real, tau_s: float) -> Callable[[Real], Real]:
@@ -210,7 +214,11 @@ MAD = 0.6745  # median absolute deviation of noise over its standard deviation
 _CLEAR = 4.0  # least unloading that is told from noise, over its standard deviation [-]
 _LIFTED = 0.005  # of the largest force: below it the tip does not press
 _RELAXATION_S = (1.0, 2.0, 4.0, 8.0, 32.0)
-_AROUND_S, _FEW = np.linspace(-2.0, 2.0, 41), 4000  # of the search around the best correlation; samples for it
+_PEAK, _PEAKS, _APART_S = 0.8, 6, 1.0  # of the correlation: share of the highest, number, and distance of those tried
+_AROUND_S, _FEW = np.linspace(-2.0, 2.0, 41), 4000  # of the search around each of them; samples for it
+_BENDS = (1 / 64, 1 / 16, 1 / 4)  # of the law, over the largest force
+_MEAN_S = (1e-3, 1.0)  # least and most over which signal and responses are averaged before they are compared
+_QUIET = 20.0  # times in which the force rises by its noise, that such a mean spans
 
 
 @dataclass(frozen=True)
@@ -278,12 +286,14 @@ def estimated(recording: Recording, time: Real, rig: RigLog, within_s: float) ->
         raise BadInput(f"{rows} rows of the rig and {len(valid)} samples without errors; expected at least 2 and 16")
     used = valid[:: max(1, len(valid) // _MOST_FITTED)]
     signal = principal_component(recording.impedance_ohm[used])
-    return _refined(time[used], signal, rig, _correlated(time[used], signal, rig, within_s))
+    starts = _correlated(time[used], signal, rig, within_s)
+    refined = (_refined(time[used], signal, rig, start) for start in starts)
+    return min(refined, key=lambda offset: (offset.by_chance, -offset.explained))
 
 
-def _correlated(time: Real, signal: Real, rig: RigLog, within_s: float) -> float:
-    """Offset with the largest cross-correlation of signal and force [s]."""
-    from scipy.signal import correlate
+def _correlated(time: Real, signal: Real, rig: RigLog, within_s: float) -> list[float]:
+    """Offsets at the highest peaks of the cross-correlation of signal and force, where abs(Z) falls if any [s]."""
+    from scipy.signal import correlate, find_peaks
 
     rows, force, _, _ = rig.sound()
     step = max(_GRID_S, (np.ptp(time) + np.ptp(rows)) / _MOST_GRID)
@@ -291,7 +301,7 @@ def _correlated(time: Real, signal: Real, rig: RigLog, within_s: float) -> float
     theirs = _high_pass(np.interp(np.arange(rows[0], rows[-1], step), rows, force))
     if len(ours) < 4 or len(theirs) < 4:
         raise BadInput(f"{min(np.ptp(time), np.ptp(rows)):.3g} s to compare; expected at least {4 * step:g} s")
-    correlation = np.abs(correlate(ours, theirs, method="fft"))
+    correlation = correlate(ours, theirs, method="fft")
     lags = np.arange(-(len(theirs) - 1), len(ours))
     shared = np.minimum(np.minimum(len(ours), len(theirs)), np.minimum(lags + len(theirs), len(ours) - lags))
     offsets = time[0] - rows[0] + lags * step
@@ -301,8 +311,12 @@ def _correlated(time: Real, signal: Real, rig: RigLog, within_s: float) -> float
             f"recording and rig's log do not overlap within {within_s:g} s: their clocks are "
             f"{time[0] - rows[0]:.6g} s apart"
         )
-    score = np.where(allowed, correlation / np.sqrt(np.maximum(shared, 1)), -1.0)
-    return float(offsets[int(np.argmax(score))])
+    score = np.where(allowed, np.abs(correlation) / np.sqrt(np.maximum(shared, 1)), -1.0)
+    edged = np.pad(score, 1, constant_values=-1.0)
+    peaks = find_peaks(edged, height=_PEAK * score.max(), distance=max(round(_APART_S / step), 1))[0] - 1
+    falling = peaks[correlation[peaks] > 0]
+    peaks = falling if len(falling) else peaks
+    return [float(offsets[k]) for k in peaks[np.argsort(-score[peaks])][:_PEAKS]]
 
 
 def _high_pass(values: Real) -> Real:
@@ -312,24 +326,36 @@ def _high_pass(values: Real) -> Real:
     return np.asarray(values - uniform_filter1d(values, min(len(values), round(20 / _GRID_S)), mode="nearest"))
 
 
-def _responses(rig: RigLog) -> Callable[[Real], Real]:
-    """Terms of force and position in the fit, at any times of the rig's clock."""
+def _responses(rig: RigLog) -> tuple[Real, Real, float]:
+    """Rows of the rig's log [s], terms of the fit at each of them (n, k), and the time to average over [s]."""
     rows, force, _, position = rig.sound()
     where = (position - position.mean()) / max(float(np.ptp(position)), 1e-9)
-    slow = [relaxation(rows, force, tau) for tau in _RELAXATION_S]
+    least = 2 * float(np.median(np.diff(rows)))  # a faster relaxation and a late clock look alike in so few rows
+    slow = [relaxation(rows, force, max(tau, least)) for tau in _RELAXATION_S]
     noise = float(np.median(np.abs(np.diff(force, 2)))) / (MAD * 6**0.5) if len(force) > 2 else 0.0
     pressed = force > max(_LIFTED * force.max(), _CLEAR * noise)
     apart = np.cumsum(np.diff(pressed, prepend=False)) * 2 * np.ptp(force)  # raises each press above those before
     peak = np.maximum.accumulate(force + apart) - apart
-    way_back = np.where(pressed, np.maximum(peak - force - _CLEAR * noise, 0), 0)
+    back = np.where(pressed, np.maximum(peak - force - _CLEAR * noise, 0), 0)
+    powers = ((force, force**2, force**3), (1.0, where, where**2))
+    bent = (np.maximum(force - share * force.max(), 0.0) for share in _BENDS)
+    immediate = (*(a * b for a, b in product(*powers)), *bent, back, back * force, back * force**2)
+    fastest = np.abs(np.interp(rows + 1.0, rows, force) - force).max()  # in a second
+    mean_s = float(np.clip(_QUIET * noise / max(fastest, 1e-9), *_MEAN_S))
+    return rows, np.column_stack([*immediate, *(term(rows) for term in slow)]), mean_s
 
-    def responses(at: Real) -> Real:
-        f, x, back = (np.interp(at, rows, column) for column in (force, where, way_back))
-        powers = ((f, f * f, f * f * f), (1.0, x, x * x))  # products: ** takes five times as long
-        immediate = (*(a * b for a, b in product(*powers)), back, back * f, back * f * f)
-        return np.column_stack([*immediate, *(term(at) for term in slow)])
 
-    return responses
+def _averaged(time_s: Real, columns: Real, mean_s: float) -> Callable[[Real], Real]:
+    """Means of columns (n, k) over a span around any times, which have as little noise as a slow response."""
+    ends = np.concatenate([[time_s[0] - mean_s], time_s, [time_s[-1] + mean_s]])
+    level = np.vstack([columns[:1], columns, columns[-1:]])
+    area = np.vstack([0 * level[:1], np.cumsum((level[1:] + level[:-1]) / 2 * np.diff(ends)[:, None], axis=0)])
+
+    def means(at_s: Real) -> Real:
+        later, earlier = at_s + mean_s / 2, at_s - mean_s / 2
+        return np.column_stack([np.interp(later, ends, of) - np.interp(earlier, ends, of) for of in area.T]) / mean_s
+
+    return means
 
 
 def _refined(time: Real, signal: Real, rig: RigLog, offset: float) -> Offset:
@@ -338,10 +364,12 @@ def _refined(time: Real, signal: Real, rig: RigLog, offset: float) -> Offset:
     half = max(float(np.ptp(time)) / 2, 1e-9)
     u = (time - middle) / half
     h = float(np.median(np.diff(rig.time_s[~rig.error]))) / 2
-    responses = _responses(rig)
+    rows, columns, mean_s = _responses(rig)
+    responses, unaveraged = _averaged(rows, columns, mean_s), signal
+    signal = _averaged(time, signal[:, None], mean_s)(time)[:, 0]
     creep = [np.log1p((1 + u) * ratio / 2) for ratio in _CREEP]
     drift, skew = np.column_stack([np.ones_like(u), u, u**2, u**3, *creep]), 0.0
-    few = slice(None, None, max(1, len(time) // _FEW))
+    few, lag = slice(None, None, max(1, len(time) // _FEW)), max(1, round(mean_s / float(np.median(np.diff(time)))))
 
     def misfit(by: float) -> float:
         model = np.hstack([drift[few], responses(time[few] - offset - by)])
@@ -360,23 +388,24 @@ def _refined(time: Real, signal: Real, rig: RigLog, offset: float) -> Offset:
         slope = -((responses(at + h) - responses(at - h)) / (2 * h)) @ of_force
         extended = np.hstack([model, slope[:, None], (slope * u * half)[:, None]])
         step = _least_squares(extended, residual)[-2:]
-        covariance = _covariance(extended, residual)
+        covariance = _covariance(extended, residual, lag)
         offset, skew = offset + float(np.clip(step[0], -h, h)), float(np.clip(skew + step[1], -MAX_SKEW, MAX_SKEW))
         if abs(step[0]) < 1e-3 * covariance[0, 0] ** 0.5 or abs(step[0]) < 1e-9:
             break
     error, skew_error = np.sqrt(np.diag(covariance))
     explained = float(np.var(fitted) / (np.var(fitted) + np.var(residual))) if np.var(signal) > 0 else 0.0
     significant = bool(abs(skew) > _SIGNIFICANT * skew_error)
-    by_chance = explained < _LEAST_SHARE or _fisher_f(signal, drift, terms, residual) < _LEAST_F
+    terms = np.column_stack([np.interp(at, rows, column) for column in columns.T])
+    by_chance = explained < _LEAST_SHARE or _fisher_f(unaveraged, drift, terms) < _LEAST_F
     return Offset(offset, float(error), skew if significant else 0.0, float(skew_error), middle, explained, by_chance)
 
 
-def _fisher_f(signal: Real, drift: Real, terms: Real, residual: Real) -> float:
+def _fisher_f(signal: Real, drift: Real, terms: Real) -> float:
     """Fisher's F of the immediate response to the force, beside drift and relaxation, which follow correlated noise."""
     slow = np.hstack([drift, terms[:, -len(_RELAXATION_S) :]])
-    without = signal - slow @ _least_squares(slow, signal)
+    without, residual = (signal - of @ _least_squares(of, signal) for of in (slow, np.hstack([drift, terms])))
     immediate = terms.shape[1] - len(_RELAXATION_S)
-    free = float(_independent(residual)) - slow.shape[1] - immediate
+    free = _independent(residual) - slow.shape[1] - immediate
     more = float(without @ without) / max(float(residual @ residual), 1e-300) - 1
     return float(more * free / immediate)
 
@@ -389,17 +418,17 @@ def _least_squares(model: Real, signal: Real) -> Real:
     return np.asarray(np.linalg.lstsq(scaled.T @ scaled, scaled.T @ signal, rcond=1e-13)[0] / size)
 
 
-def _covariance(model: Real, residual: Real) -> Real:
+def _covariance(model: Real, residual: Real, lag: int = 1) -> Real:
     """Covariance of the last two weights for correlated residuals."""
     variance = float((residual**2).sum()) / max(len(residual) - model.shape[1], 1)
-    variance *= len(residual) / _independent(residual)
+    variance *= len(residual) / _independent(residual, lag)
     return np.asarray(np.linalg.pinv(model.T @ model)[-2:, -2:] * variance)
 
 
-def _independent(residual: Real) -> float:
-    """Number of independent residuals of a first-order autoregressive process."""
-    count = len(residual)
-    rho = float((residual[1:] * residual[:-1]).sum() / max(float((residual**2).sum()), 1e-300))
+def _independent(residual: Real, lag: int = 1) -> float:
+    """Number of independent residuals of a first-order autoregressive process, by those a lag apart."""
+    count = len(residual) / lag
+    rho = float((residual[lag:] * residual[:-lag]).sum() / max(float((residual**2).sum()), 1e-300))
     rho = min(max(rho, 0.0), 1 - 1 / count)
     return count * (1 - rho) / (1 + rho)
 

@@ -15,6 +15,7 @@ from sensorgen.measure.signal.presses import Pairs
 from sensorgen.measure.signal.run import Hysteresis, Processed, Ways
 
 Values = tuple[float, ...]
+_BY_NOISE = 3.2  # standard errors that the largest of the differences at 33 forces exceeds in 5 of 100 cases
 _AT_REST = (
     Column("at rest", "Hz", si=True), Column("R", "ohm", right=True), Column("X", "ohm", right=True),
     Column("noise", "%", digits=2), Column("Cs", "F", si=True),
@@ -198,9 +199,9 @@ def of_recording(worked: Processed, rig: RigLog | None, files: Iterable[str] = (
 
 
 def _at_rest(worked: Processed) -> Iterator[RestResult]:
-    """Mean and scatter of the valid samples at each frequency; nothing of fewer than two."""
+    """Mean and scatter of the valid samples with no force at each frequency; nothing of fewer than two."""
     one = worked.recording
-    z = one.impedance_ohm[one.valid()]
+    z = worked.rest_ohm()
     z = z[np.isfinite(z).all(axis=1)]
     if len(z) < 2:
         return
@@ -259,6 +260,12 @@ class HysteresisResult:
             for p in self.presses for k in _ends(self.tones_hz)
         )  # fmt: skip
         yield Table("presses", "", columns, tuple(rows))
+        noisy = [
+            share[k] < _BY_NOISE * error[k] for p in self.presses for k in _ends(self.tones_hz)
+            for share, error in ((p.share_re, p.error_re), (p.share_im, p.error_im))
+        ]  # fmt: skip
+        if any(noisy):
+            yield f"{sum(noisy)} of {len(noisy)} distances are below {_BY_NOISE} of their ±, as noise alone makes them"
         yield from (*self.left_out, *self.files)
 
 

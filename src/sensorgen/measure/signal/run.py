@@ -46,6 +46,17 @@ class Processed:
     by_force: bool
     notes: tuple[str, ...]
 
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Presses that were left out, or why the rig's force shows none."""
+        return self.pairs.left_out if self.pairs else self.notes[-1:] if self.by_force else ()
+
+    def rest_ohm(self) -> Complex:
+        """Readings with nothing on the sensor (k, m): before presses, else the valid ones without a force [ohm]."""
+        if self.pairs:
+            return self.pairs.before_ohm
+        return self.recording.impedance_ohm[self.recording.valid() & ~(np.abs(self.force_n) >= THRESHOLD_N / 2)]
+
 
 def processed(
     recording: Recording, rig: RigLog | Joined | None = None, *, remove_drift: bool = True, law: str = "",
@@ -95,10 +106,20 @@ def processed(
             notes.append(f"drift not removed: {error}")
     try:
         pairs = presses.pairs(one.time_s, z, valid, spans, force, beside.set_position_mm) if spans else None
-        notes += map("left out: {}".format, pairs.left_out) if pairs else ["nothing pressed"]
+        notes += map("left out: {}".format, pairs.left_out) if pairs else [_no_presses(force)]
     except BadInput as error:
-        notes.append(f"no presses: {error}")
+        notes.append(_no_presses(force, f"no presses: {error}"))
     return Processed(one, force, *filtered, removed, pairs, beside.clocks.offset_error_s, rig is not None, tuple(notes))
+
+
+def _no_presses(force_n: Real, otherwise: str = "nothing pressed") -> str:
+    """Reason that a force shows no press after a rest: its zero, its sign, or another one."""
+    low, high = np.nanmin(force_n, initial=np.inf), np.nanmax(force_n, initial=-np.inf)
+    if THRESHOLD_N / 2 <= low < np.inf:
+        return f"no presses: the force is never below {low:.3g} N; expected 0 between presses: take its zero off"
+    if low <= -THRESHOLD_N and high < -low:
+        return f"no presses: the force goes down to {low:.3g} N; expected one that rises under a press: change its sign"
+    return otherwise
 
 
 def _beside(recording: Recording, rig: RigLog | Joined | None) -> Joined:
@@ -250,5 +271,5 @@ def of_presses(worked: Processed, threshold_n: float = THRESHOLD_N) -> Ways:
         except BadInput as error:
             left_out.append(f"left out: press at {press.start_s:.6g} s: {error}")
     if not ways:
-        raise BadInput(left_out[0] if left_out else "nothing pressed")
+        raise BadInput(left_out[0] if left_out else _no_presses(force))
     return Ways(ways, tuple(left_out))

@@ -106,7 +106,7 @@ class Presses(Samples):
     force_n, position_m : (n,) array
         As the rig says [N], [m].
     unloading : (n,) array
-        By which share the highest force of this press so far is above the force [-]; nan where unknown.
+        By which share of it the force is below the highest one of this press so far [-]; nan where unknown.
     decades : (n,) array
         Common logarithm of the time at this force over 1 s [-]; nan where unknown.
     """
