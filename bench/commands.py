@@ -1,4 +1,4 @@
-"""Time of whole commands from an empty cache, of the processor with the processes that it starts and elapsed, and again.
+"""Time of whole commands from an empty cache: of the processor, with processes that they start; elapsed; and again.
 
 Writes ``results/commands.md``. ``--beside FOLDER`` times another source tree in turn, command by command: a computer
 that does other things slows both. G-code is sliced first, by both slicers.
@@ -80,7 +80,7 @@ def main() -> None:
             print(lines[-1], flush=True)
     about = (
         f"Medians of {given.runs}, from an empty cache: processor seconds with the processes that a command starts "
-        "(slicer, mesher, a drawing's prediction), and the time that passes; processor seconds again. Targets: cold, again."
+        "(slicer, mesher, a drawing's prediction), and elapsed; then processor seconds again. Targets: cold, again."
     )
     PAGE.write_text(
         "\n".join(["# Time of whole commands", "", "Made by `bench/commands.py`.", "", about, "", *lines, ""])
