@@ -24,7 +24,7 @@ Frequencies = Annotated[
     Option("Frequencies, as in 1.1kHz,2.3kHz; the thesis's seven if not given.", ("--frequencies",), FREQUENCY_HZ),
 ]
 Noise = Annotated[
-    float, Option("Standard error of R and of X of a reading, relative to abs(Z).", kind="proper share", typed="0.1%")
+    float, Option("Standard error of R and of X of a reading, relative to |Z|.", kind="proper share", typed="0.1%")
 ]
 
 
@@ -54,8 +54,8 @@ class Query:
         How the cell deforms: as a plate, free or bonded, as infill of flat electrodes, or solved (needs NGSolve;
         seconds in a cross-section, up to minutes in 3D); if not given, solved in a cross-section.
     accuracy : float or None
-        Of abs(Z): cell, compression and line by the least expensive models that together meet it. Exit code 1 where they
-        do not.
+        Of abs(Z): cell, compression and line by the least expensive models that together meet it. Exit code 1 where
+        they do not.
     noise : float
         Standard deviation of Re Z and of Im Z, each, relative to abs(Z) [-].
     range_kpa : tuple of (float, float) or None
