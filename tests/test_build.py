@@ -2,7 +2,9 @@
 
 import hashlib
 import json
+import multiprocessing
 import os
+import signal
 from functools import partial
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from sensorgen.core import lazy as registry
 from sensorgen.core import parallel
 from sensorgen.core.cache import only_known
 from sensorgen.core.errors import Unprintable
+from sensorgen.core.parallel import cores
 from sensorgen.design import design, shapes
 from sensorgen.export.threemf import FAMILIES
 from sensorgen.prediction import bodies
@@ -159,12 +162,12 @@ def test_a_crossing_is_predicted_in_another_process_to_the_same_files(tmp_path, 
     plan = {"length_mm": 10, "width_mm": 10, "pitch_x_mm": 5, "pitch_y_mm": 5, "column_mm": 4, "row_mm": 4}
     array = design.make({"shape": "array", "name": "a", "parameters": plan, "cell": {"shape": "reference"}})
     found = []
-    for cores, predict in ((2, known_only), (1, evaluate)):
-        monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / f"cache-{cores}"))
-        monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
+    for count, predict in ((2, known_only), (1, evaluate)):
+        monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / f"cache-{count}"))
+        monkeypatch.setattr(parallel, "cores", lambda count=count: count)
         monkeypatch.setattr(workflow, "evaluate", predict)
-        build(array, tmp_path / f"{cores}", cad=False, force=True)
-        found.append(contents(tmp_path / f"{cores}"))
+        build(array, tmp_path / f"{count}", cad=False, force=True)
+        found.append(contents(tmp_path / f"{count}"))
     assert found[0] == found[1]
     assert found[0]["a/prediction.json"]
 
@@ -198,3 +201,41 @@ def test_a_drawing_is_predicted_in_another_process_to_the_same_numbers(monkeypat
     with ahead(of):
         assert evaluate(bodies.estimated(sensor)) == both
     assert here == []
+
+
+def stuck(parent, sensor):
+    """Body of a drawing; any other process than the parent never gets it."""
+    if os.getpid() != parent:
+        signal.pause()
+    return bodies.drawn(sensor)
+
+
+@pytest.mark.own_cache
+def test_a_prediction_that_nobody_has_waited_for_is_ended(monkeypatch):
+    monkeypatch.setattr(parallel, "cores", lambda: 2)
+    sensor = design.make({"shape": "reference", "parameters": {"length_mm": 11.0}})
+    with ahead(partial(stuck, os.getpid(), sensor)):
+        assert multiprocessing.active_children()
+    assert not multiprocessing.active_children()
+
+
+def test_a_daemon_starts_no_process(monkeypatch):
+    """It may not: a build in a worker of a user's own pool."""
+    assert cores() >= 1
+    monkeypatch.setitem(multiprocessing.current_process()._config, "daemon", True)
+    assert cores() == 1
+
+
+def test_the_file_of_a_cells_shape_decides_an_array():
+    """Else a change of it would find the old findings and slices."""
+    array = design.make({"shape": "array", "cell": {"shape": "reference"}})
+    first, second = (array.model_copy(update={"own": {"shapes": {"mine": text}}}).id() for text in "ab")
+    assert len({array.id(), first, second}) == 3
+
+
+def test_interfaces_of_a_film_that_is_not_there_change_nothing():
+    """A plain plate has no film of its own: the slot's material is nowhere in it."""
+    plate = {"shape": "reference", "materials": {"film": "ninjaflex"}}
+    gap = {"material_values": {"ninjaflex": {"interface_gap_m": 1e-5}}}
+    without, with_gap = (evaluate(bodies.drawn(design.make(plate | more)), keep=False) for more in ({}, gap))
+    assert with_gap.capacitance == without.capacitance

@@ -281,6 +281,9 @@ class Lane:
     def check(self, *, idle: bool) -> None:
         """Raise SensorgenError where no results will come any more; a process that has died says so itself."""
 
+    def end(self) -> None:
+        """End its process at once, if it is its own."""
+
 
 class _Process(Lane):
     """A fresh process, so that solver and CAD kernel never meet in one; alone in its pool, so that it dies alone."""
@@ -328,7 +331,11 @@ def _without_main() -> Iterator[None]:
 
 
 def cores() -> int:
-    """Number of processor cores that this process may use."""
+    """Number of processor cores that this process may use; 1 where it may start no other one."""
+    import multiprocessing
+
+    if multiprocessing.current_process().daemon:
+        return 1
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

@@ -386,6 +386,8 @@ class Design(Strict):
             data.pop(key, None)
         if self._shape_text is not None:
             data["shape_text"] = self._shape_text
+        elif self.own.get("shapes"):  # of an array's cell
+            data["cell_text"] = self.own["shapes"]
         text = json.dumps(data, sort_keys=True, allow_nan=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 

@@ -72,8 +72,15 @@ def ahead(of: Callable[[], Body], query: Query = DEFAULT, *, wanted: bool = True
         if wanted and parallel.cores() > 1 and not is_stored(of, query):
             (lane,) = stack.enter_context(parallel.open_lanes(1))
             running.append(lane.submit(_predict, [(of, query)]))
+            stack.callback(_end, lane, running[0])
         stack.callback(_AHEAD.reset, _AHEAD.set(partial(wait, running)))
         yield partial(wait, running)
+
+
+def _end(lane: parallel.Lane, running: Future[Any]) -> None:
+    """End a process that nobody has waited for: what it predicts is of no use."""
+    if not running.done():
+        lane.end()
 
 
 def is_stored(of: Callable[[], Body], query: Query = DEFAULT) -> bool:

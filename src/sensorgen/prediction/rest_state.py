@@ -205,6 +205,8 @@ def perfect_interfaces(design: Design) -> Iterator[str]:
 def _of_film(design: Design, quantity: str) -> list[MaterialValue]:
     """A film's leak per area [S/m2], or the air gap equal to its interfaces [m], where one is known."""
     material, source = design.slot("film")
+    if material.name not in {body.material for body in design.drawn.bodies}:
+        return []
     try:
         value = material.value(quantity, source or design.used().get(material.name, ""))
     except MissingValue:
@@ -325,7 +327,7 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
     )  # fmt: skip
     ends = (rho["top"].value, rho["bottom"].value)
     resistance, missing = _resistance(body)
-    doubts = (*remarks, *unknown, *missing)
+    doubts = (*remarks, *unknown, *missing, *_unchanged_rise(interface))
     return RestState(
         answer, bounds, resistance, ends, (*values, *gap, *rho.values()), by_width, by_film, layer * c.middle(), doubts,
         Interval(*interface[1:]).times(answer.capacitance_f.middle()),
@@ -405,6 +407,13 @@ def _interface_ratios(body: Body, gap: Sequence[MaterialValue], eps: Mapping[str
         for g in (gap[0].value, *stated.spread(body.design, gap[0]))
     )
     return Added(sum(usual) / 2, min(map(min, ends)), max(map(max, ends)))
+
+
+def _unchanged_rise(interface: "Added") -> Iterator[str]:
+    """Doubt about the rise of C under a load, which is that of perfect interfaces: in series it changes as C does."""
+    if interface.value != 1:
+        off = 100 * (interface.value - 1)
+        yield f"sensitivity and resolutions take the film's interfaces as perfect: the rise of C is {off:+.2g} % off"
 
 
 def permittivity_ratios(design: Design, scene: Scene) -> dict[str, tuple[float, float]]:

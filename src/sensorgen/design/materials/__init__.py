@@ -43,6 +43,7 @@ _PLAUSIBLE = {  # of any solid, foam or gel, and of any print; what is beyond ha
     "youngs_modulus_pa": (1e2, 2e12),
     "tensile_strength_pa": (1e2, 1e11),
     "density_kg_m3": (1.0, 23e3),
+    "interface_gap_m": (-1e-3, 1e-3),
     "elongation_at_break": (0.0, 50.0),
     "hardness_shore_a": (0.0, 100.0),
     "hardness_shore_d": (0.0, 100.0),

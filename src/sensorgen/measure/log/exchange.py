@@ -83,7 +83,9 @@ def export(log: Log, place: Path) -> int:
     """
     file_format = place.suffix.lower().removeprefix(".")
     if file_format in FORMATS:
-        used = (row for row in log.entries(Reading, superseded=True) if not log.withdrawn(row))
+        newest = {row.uid for row in log.entries(Reading)}  # of which none is withdrawn
+        every = log.entries(Reading, superseded=True)
+        used = (row for row in every if row.uid in newest or not log.withdrawn(row))
         return _write_table(used, Reading, place, file_format)
     if place.suffix or os.path.lexists(place):
         raise BadInput(

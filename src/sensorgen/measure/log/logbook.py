@@ -481,8 +481,10 @@ class Log(AbstractContextManager["Log", None]):
         ]
 
     def withdrawn(self, entry: Entry) -> bool:
-        """Test whether a row, or its last correction, is withdrawn."""
-        return any(isinstance(later, Withdrawal) or self.withdrawn(later) for later in self.superseding(entry))
+        """Test whether a row is withdrawn, or every correction of it."""
+        later = self.superseding(entry)
+        corrections = [self.withdrawn(row) for row in later if not isinstance(row, Withdrawal)]
+        return len(corrections) < len(later) or (bool(corrections) and all(corrections))
 
     def _with_print(self, entry: Reading | BenchRun) -> Reading | BenchRun:
         """Entry with batch and design of the specimen's latest print."""

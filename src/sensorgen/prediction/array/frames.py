@@ -502,7 +502,7 @@ class MapInverter:
         for number in range(1, _STEPS + 1):
             left = siemens - self.read(c).siemens
             off = np.stack([np.nan_to_num(left.real) * weights[0], np.nan_to_num(left.imag) * weights[1]])
-            if gain.shape[0] == 2:
+            if self.model.here.size > MOST_DENSE:
                 step = (gain * off.reshape(2, -1)).sum(0)
             else:
                 step = gain @ off.ravel() - variance * ((c - start) / self.prior_f**2).ravel()
@@ -561,7 +561,7 @@ class MapInverter:
     def correlation(self) -> "Real | None":
         """Of errors of capacitances by noise, (m n, m n), 0 of each with itself; none of large arrays [-]."""
         gain, variance = self.gain
-        if gain.shape[0] == 2:
+        if self.model.here.size > MOST_DENSE:
             return None
         found = gain @ gain.T / np.sqrt(np.outer(variance, variance))
         np.fill_diagonal(found, 0.0)
