@@ -252,7 +252,7 @@ def test_frames_of_another_array_are_refused(folder):
     from sensorgen.measure.lab.devices import RealClock
 
     form = FrameForm(2, 3)
-    with serving.pseudo_terminal(Device([form.header(), *lines(3)] * 50), RealClock()) as path:
+    with serving.pseudo_terminal(Device([form.header(), *lines(3)] * 5000), RealClock()) as path:
         code, _, text = run_all(folder, "bench", "array", "a.yaml", "--port", path, "--no-page", "--seconds", "1")
     assert code == 2
     assert "frames of 2 x 3; expected 5 x 6, as of a" in text
