@@ -78,7 +78,7 @@ def ahead(of: Callable[[], Body], query: Query = DEFAULT, *, wanted: bool = True
 
 
 def _end(lane: parallel.Lane, running: Future[Any]) -> None:
-    """End a process that nobody has waited for: what it predicts is of no use."""
+    """End a process that was not waited for: what it predicts is of no use."""
     if not running.done():
         lane.end()
 
