@@ -170,6 +170,7 @@ def test_lists_of_designs():
         lambda: sg.compress(PLATE, 10.0, accuracy=np.nan), lambda: sg.predict(PLATE, tip="5mm"),
         lambda: sg.predict(PLATE, force_n="6 N"), lambda: sg.cell(PLATE, frequency_hz=[1e3, 1e4]),
         lambda: sg.cell(PLATE, frequency_hz=0.0), lambda: sg.sweep(PLATE, dielectric_mm=[0.2], jobs=0),
+        lambda: sg.sweep(PLATE, dielectric_mm=[0.2], jobs=2.5),
         lambda: sg.sweep(PLATE, dielectric_mm=[0.2], query=3), lambda: sg.check({"a": PLATE}),
     ],
 )  # fmt: skip

@@ -20,7 +20,7 @@ from sensorgen.core.version import __version__
 PLACE = "SENSORGEN_CACHE"  # environment variable with another folder
 _SOURCES = (  # what decides an answer
     "asprinted", "checks", "design", "export", "models", "prediction", "scene", "solvers", "core/bounds.py",
-    "core/units.py",
+    "core/findings.py", "core/units.py",
 )  # fmt: skip
 
 JSON = Any  # None, bool, int, float, str, and lists and string-keyed dicts of these
