@@ -410,10 +410,10 @@ def _interface_ratios(body: Body, gap: Sequence[MaterialValue], eps: Mapping[str
 
 
 def _unchanged_rise(interface: "Added") -> Iterator[str]:
-    """Doubt about the rise of C under a load, which is that of perfect interfaces: in series it changes as C does."""
+    """Doubt about the rise of C under a load: a gap in series changes it by the ratio by which it changes C."""
     if interface.value != 1:
-        off = 100 * (interface.value - 1)
-        yield f"sensitivity and resolutions take the film's interfaces as perfect: the rise of C is {off:+.2g} % off"
+        by = 100 * (interface.value - 1)
+        yield f"sensitivity and resolutions are of perfect interfaces; the film's gap changes the rise of C by {by:+.2g} %"
 
 
 def permittivity_ratios(design: Design, scene: Scene) -> dict[str, tuple[float, float]]:
