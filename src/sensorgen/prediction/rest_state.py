@@ -413,7 +413,7 @@ def _unchanged_rise(interface: "Added") -> Iterator[str]:
     """Doubt about the rise of C under a load: a gap in series changes it by the ratio by which it changes C."""
     if interface.value != 1:
         by = 100 * (interface.value - 1)
-        yield f"sensitivity and resolutions are of perfect interfaces; the film's gap changes the rise of C by {by:+.2g} %"
+        yield f"sensitivity and resolutions are of perfect interfaces; the gap changes the rise of C by {by:+.2g} %"
 
 
 def permittivity_ratios(design: Design, scene: Scene) -> dict[str, tuple[float, float]]:
