@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import inf
-from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
@@ -179,7 +178,7 @@ def sweep(
     if wrong or not values:
         given = (*wrong, "sweep() without values")[0]
         raise BadInput(f"{given}; expected values of a setting, as dielectric_mm=[0.2, 0.3]")
-    if not isinstance(jobs, Integral) or jobs < 1:
+    if not isinstance(jobs, int | np.integer) or jobs < 1:
         raise BadInput(f"jobs={jobs}; expected 1 or more processes")
     _of_type("query", query, Query)
     points = [(chosen, _body(one)) for chosen, one in varied(_named(design), values)]
