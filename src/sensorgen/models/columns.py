@@ -37,13 +37,12 @@ def why_not_applicable(scene: Scene) -> str | None:
     if reason := third_conductor(scene):
         return reason
     try:
-        gaps = _gaps(scene)
+        gaps = [_gap(column) for part in overlay_parts(scene) for column in _distinct(part).values()]
     except ValueError as error:
         return str(error)
-    known = [(gap.bottom_mm, gap.top_mm) for gap in gaps if gap is not None]
-    if len(known) < len(gaps):
+    if not all(gaps):
         return "an electrode does not cover the whole sensor"
-    floors, roofs = np.swapaxes(known, 0, 1)
+    floors, roofs = np.array([(gap[0].top_mm, gap[-1].bottom_mm) for gap in gaps]).swapaxes(0, 1)
     if (roofs - floors).min() <= 0:
         return "the electrodes touch: the capacitance grows without bound"
     if floors.max() >= roofs.min() and not _is_one_section(scene):
@@ -122,27 +121,11 @@ def _level(rows: Sequence["_Row"]) -> float:
     return float(1 / (np.diff(levels) ** 2 / masses).sum())
 
 
-@dataclass(frozen=True)
-class _Gap:
-    """The space between the electrodes in one column; pairs are left and right side."""
-
-    bottom_mm: tuple[float, float]
-    top_mm: tuple[float, float]
-    layers: tuple[Layer, ...]
-
-
-def _gaps(scene: Scene) -> list[_Gap | None]:
-    return [_gap(column) for part in overlay_parts(scene) for column in _distinct(part).values()]
-
-
-def _gap(cell: SectionColumn) -> _Gap | None:
-    """The layers between the uppermost bottom electrode and the lowest top electrode above it."""
+def _gap(cell: SectionColumn) -> tuple[Layer, ...]:
+    """Layers from the uppermost bottom electrode to the lowest top electrode above it; none where one is missing."""
     floors = [k for k, layer in enumerate(cell.layers) if layer.body.terminal == "bottom"]
     roofs = [k for k, layer in enumerate(cell.layers) if layer.body.terminal == "top"]
-    if not floors or not roofs or roofs[0] < floors[-1]:
-        return None
-    between = cell.layers[floors[-1] + 1 : roofs[0]]
-    return _Gap(cell.layers[floors[-1]].top_mm, cell.layers[roofs[0]].bottom_mm, between)
+    return tuple(cell.layers[floors[-1] : roofs[0] + 1]) if floors and roofs and roofs[0] > floors[-1] else ()
 
 
 @dataclass(frozen=True)
@@ -247,11 +230,12 @@ def _graded(left: float, right: float) -> tuple[NDArray[np.float64], NDArray[np.
 
 def _stack(cell: SectionColumn, permittivity: Mapping[str, float]) -> _Stack:
     gap = _gap(cell)
-    if gap is None:
+    if not gap:
         raise ValueError("an electrode does not cover the whole sensor: ask why_not_applicable() first")
-    lines, eps = [gap.bottom_mm], []
-    layers = [(layer.bottom_mm, layer.top_mm, layer.body.material) for layer in gap.layers]
-    for bottom, top, material in [*layers, (gap.top_mm, gap.top_mm, "air")]:
+    floor, *between, roof = gap
+    lines, eps = [floor.top_mm], []
+    layers = [(layer.bottom_mm, layer.top_mm, layer.body.material) for layer in between]
+    for bottom, top, material in [*layers, (roof.bottom_mm, roof.bottom_mm, "air")]:
         for line, below in ((bottom, "air"), (top, material)):
             if max(line[0] - lines[-1][0], line[1] - lines[-1][1]) > 0:
                 lines.append(line)

@@ -374,7 +374,7 @@ def solved(
     youngs_modulus_pa : mapping of str to float
         By material [Pa]. The stress scales with them, as long as their ratio is that of the solved cell.
     """
-    for cell in _cells()["cells"]:
+    for cell in _read("solved_cells.yaml")["cells"]:
         moduli = cell["youngs_modulus_pa"]
         factors = [youngs_modulus_pa.get(name, 0.0) / modulus for name, modulus in moduli.items()]
         same = all(abs(parameters.get(k, v) - v) < _SAME for k, v in cell["parameters"].items())
@@ -392,7 +392,7 @@ def solved_print(content: str, youngs_modulus_pa: Mapping[str, float]) -> Capaci
 
 def prototype(shape: str) -> CapacitanceCurve:
     """The first stored curve of a shape, for films of ``PROTOTYPE_PA``: an estimate for similar cells."""
-    return _curve(next(cell for cell in _cells()["cells"] if cell["shape"] == shape), 1.0)
+    return _curve(next(cell for cell in _read("solved_cells.yaml")["cells"] if cell["shape"] == shape), 1.0)
 
 
 def _curve(cell: Mapping[str, Any], scale: float) -> CapacitanceCurve:
@@ -405,10 +405,6 @@ def _curve(cell: Mapping[str, Any], scale: float) -> CapacitanceCurve:
         boundary_changes=tuple(changes.values()), displacement_m=cell["displacement_um"] / _UM_PER_M,
         doubts=tuple(cell.get("doubts", ())),
     )  # fmt: skip
-
-
-def _cells() -> dict[str, Any]:
-    return _read("solved_cells.yaml")
 
 
 @cache

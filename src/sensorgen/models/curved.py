@@ -5,7 +5,7 @@ finer meshes. Needs NGSolve. See docs/curved.md.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import lru_cache
 from importlib.util import find_spec
 from itertools import pairwise
@@ -17,9 +17,10 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.models import refusal
 from sensorgen.scene.layers import Region
-from sensorgen.scene.repetition import Repeat, halved, repeat
+from sensorgen.scene.repetition import halved, repeat
 from sensorgen.scene.scene import SLIVER_MM, Body, Piece, Scene, dielectrics
 from sensorgen.solvers.electrostatics import bounds as fem
+from sensorgen.solvers.electrostatics.round_cell import RoundCell
 
 SOURCE = "Dirichlet's and Thomson's principles; curved tetrahedra, H1 and hybrid H(div) by NGSolve"
 COST = 3
@@ -59,17 +60,14 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 
 def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[fem.FieldStep]:
     """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
-    from sensorgen.solvers.electrostatics.round_bodies import RoundCell, bounds
+    from sensorgen.solvers.electrostatics.round_bodies import bounds
 
-    own, x, y = cell(scene)
-    values = [float(permittivity[name]) for name in own.materials]
-    shares = np.outer(x.shares, y.shares)
-    cuts = x.places_mm[1:-1].tolist(), y.places_mm[1:-1].tolist()
-    plan = RoundCell(own.low_mm, own.high_mm, own.pieces, len(_ENDS), values, cuts, shares)
+    own, materials = cell(scene)
+    plan = replace(own, permittivity=[float(permittivity[name]) for name in materials])
     reached = False
     try:
         for level, elements, energies in bounds(plan, width):
-            interval = fem.whole(energies, shares.ravel().tolist())
+            interval = fem.whole(energies, plan.shares.ravel().tolist())
             reached = True
             yield fem.FieldStep(level.order, elements, energies.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
             if interval.width() <= width:
@@ -77,16 +75,6 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     except fem.Unsolved:
         if not reached:  # else the mesh before it answers as well as it can
             raise
-
-
-@dataclass(frozen=True)
-class MirrorWindow:
-    """Pieces between the mirrors of a scene, as of :class:`RoundCell`, and the materials of its dielectrics."""
-
-    low_mm: tuple[float, float, float]
-    high_mm: tuple[float, float, float]
-    pieces: tuple[tuple[Piece, int], ...]
-    materials: tuple[str, ...]
 
 
 def _looks(scene: Scene) -> Iterator[Region]:
@@ -108,8 +96,8 @@ def _at(scene: Scene, z_mm: float) -> Iterator[Region]:
 
 
 @lru_cache(maxsize=8)
-def cell(scene: Scene) -> tuple[MirrorWindow, Repeat, Repeat]:
-    """The cell of a scene, and how it repeats along x and y.
+def cell(scene: Scene) -> tuple[RoundCell, tuple[str, ...]]:
+    """The cell of a scene without permittivities, and the materials of its dielectrics.
 
     Raises
     ------
@@ -128,7 +116,9 @@ def cell(scene: Scene) -> tuple[MirrorWindow, Repeat, Repeat]:
     if len(near) > _MOST:
         raise ValueError(f"its cell has {len(near)} bodies; at most {_MOST} are solved")
     materials = dielectrics(body for body, _ in near)
-    return MirrorWindow(low, high, tuple((piece, _kind(body, materials)) for body, piece in near), materials), x, y
+    pieces = tuple((piece, _kind(body, materials)) for body, piece in near)
+    cuts = x.places_mm[1:-1].tolist(), y.places_mm[1:-1].tolist()
+    return RoundCell(low, high, pieces, len(_ENDS), (), cuts, np.outer(x.shares, y.shares)), materials
 
 
 def _kind(body: Body, materials: Sequence[str]) -> int:

@@ -5,15 +5,16 @@ survives every limit. It keeps Re Z, which alone has information on position and
 """
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.arrays import Complex
-from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.solvers.line.inputs import HIGHEST_OHM, PressedLine, check_fit, far_load, in_blocks, passive, read
-from sensorgen.solvers.line.slopes import slopes
+from sensorgen.solvers.line.slopes import BY, OF_PATCH, impedance_and_slopes
 from sensorgen.solvers.line.tanhc import tanhc
 
 __all__ = ["PressedLine", "cascade", "corner_frequency_hz", "impedance", "sensitivities"]
@@ -161,7 +162,17 @@ def sensitivities(line: PressedLine, of: Iterable[str] | None = None) -> tuple[C
     >>> round(float(abs(by["force_n"])), 3), round(float(by["left_m"].real), 2)
     (3.922, 90.55)
     """
-    return slopes(line, of)
+    names = tuple(BY if of is None else of)
+    for name in names:
+        if name not in BY:
+            raise UnknownName("input to differentiate by", name, BY)
+    if OF_PATCH & set(names) and line.modulus_pa is None:
+        raise MissingValue("a derivative by force or patch needs modulus_pa")
+    inputs = read(line)
+    if OF_PATCH & set(names) and not inputs["tip_m"].all():
+        raise OutOfRange("a derivative by force or patch needs a patch: tip_m above 0")
+    first, *rest = inputs.evaluate(partial(impedance_and_slopes, names), 1 + len(names))
+    return first, dict(zip(names, rest, strict=True))
 
 
 def corner_frequency_hz(resistance_ohm: float, capacitance_f: float) -> float:

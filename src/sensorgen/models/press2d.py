@@ -120,7 +120,7 @@ def _of_size(part: Pressed, apex_mm: float, *, finer_failed: bool, largest: bool
 
     Of all but the largest, what is not sound is left to larger ones.
     """
-    part = part if largest else replace(part.first(part.sound_loads()), faults=())
+    part = part if largest else replace(part.some(range(part.sound_loads())), faults=())
     part = replace(part, apex_m=(apex_mm * M_PER_MM,) * len(part.stress_pa))
     if not finer_failed or len(part.stress_pa) == 1:
         return part
@@ -135,9 +135,7 @@ def _solved(
     mesh = mesh_of(cell, fineness)
     materials = [cell.regions[k - 1].material for k in mesh.region.tolist()]
     longest = _STICKING_STEP if boundary.contact == "stick" else _STEP
-    pressed, run = solve(
-        mesh, [solids[m] for m in materials], stress_pa, boundary, longest, SOURCE, step or (lambda _: None)
-    )
+    pressed, run = solve(mesh, [solids[m] for m in materials], stress_pa, boundary, longest, SOURCE, step)
     if not cell.mirrored:
         remark = "solved as if each period were followed by its mirror image: the cell is not symmetric"
         pressed = replace(pressed, doubts=(remark, *pressed.doubts))

@@ -102,9 +102,7 @@ def press(
     check(stress_pa, boundary)
     most = int((_MOST / max((bricks.fill > 0).sum(), 1)) ** (1 / 3))
     fineness = replace(wanted, pieces=min(wanted.pieces, max(most, 1)))
-    pressed, run = _solved(
-        bricks.cut(fineness.pieces, fineness.shrink), solids, stress_pa, boundary, step or (lambda _: None)
-    )
+    pressed, run = _solved(bricks.cut(fineness.pieces, fineness.shrink), solids, stress_pa, boundary, step)
     if fineness != wanted:
         remark = f"every box cut into {fineness.pieces} pieces along each axis, not {wanted.pieces}: there are many"
         pressed = replace(pressed, doubts=(*pressed.doubts, remark))
@@ -113,7 +111,7 @@ def press(
 
 def _solved(
     cut: Bricks, solids: Mapping[str, Elastic], stress_pa: Sequence[float], boundary: BoundaryConditions,
-    step: Callable[[float], None],
+    step: Callable[[float], None] | None,
 ) -> "tuple[Pressed, LoadSteps[BrickMesh]]":  # fmt: skip
     from sensorgen.solvers.contact.bricks import mesh_of
 

@@ -82,7 +82,7 @@ def cell(scene: Scene, fineness: Fineness = USUAL) -> ContactCell:
     if reason := third_conductor(scene):
         raise BadInput(f"{_WANTED}: {reason}")
     try:
-        window, _, _ = curved.cell(scene)
+        window, _ = curved.cell(scene)
     except ValueError as error:
         raise BadInput(f"{_WANTED}: {error}") from None
     (x0, y0, z0), (x1, y1, _) = window.low_mm, window.high_mm

@@ -26,15 +26,14 @@ class PressureProfile:
 
     Attributes
     ----------
-    name, source : str
-        Name of the profile, and its source.
+    source : str
+        Tip that it describes.
     share : function
         Share of the force up to a place, from 0 at one end of the tip to 1 at the other [-].
     density : function
         Its derivative: pressure over its mean [-].
     """
 
-    name: str
     source: str
     share: Callable[[Real], Real]
     density: Callable[[Real], Real]
@@ -45,14 +44,14 @@ def _hertz_share(place: Real) -> Real:
     return np.asarray((angle - np.sin(angle) * np.cos(angle)) / np.pi)
 
 
-_KNOWN = (
-    PressureProfile("uniform", "flat tip, soft, or hard on a film much thinner than itself", lambda u: u, np.ones_like),
-    PressureProfile("hertz", "round tip on a body much thicker than the contact is long: an ellipse", _hertz_share,
-                    lambda u: 8 / np.pi * np.sqrt(u * (1 - u))),
-    PressureProfile("parabola", "hard round tip on a thin layer, a bed of springs", lambda u: u * u * (3 - 2 * u),
-                    lambda u: 6 * u * (1 - u)),
-)  # fmt: skip
-PROFILES = tuple(profile.name for profile in _KNOWN)
+_KNOWN = {
+    "uniform": PressureProfile("flat tip, soft, or hard on a film much thinner than itself", lambda u: u, np.ones_like),
+    "hertz": PressureProfile("round tip on a body much thicker than the contact is long: an ellipse", _hertz_share,
+                             lambda u: 8 / np.pi * np.sqrt(u * (1 - u))),
+    "parabola": PressureProfile("hard round tip on a thin layer, a bed of springs", lambda u: u * u * (3 - 2 * u),
+                                lambda u: 6 * u * (1 - u)),
+}  # fmt: skip
+PROFILES = tuple(_KNOWN)
 
 
 def profile(name: str) -> PressureProfile:
@@ -63,10 +62,9 @@ def profile(name: str) -> PressureProfile:
     UnknownName
         There is none of that name.
     """
-    for known in _KNOWN:
-        if known.name == name:
-            return known
-    raise UnknownName("profile of pressure", name, PROFILES)
+    if name not in _KNOWN:
+        raise UnknownName("profile of pressure", name, PROFILES)
+    return _KNOWN[name]
 
 
 @dataclass(frozen=True)

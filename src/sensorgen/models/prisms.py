@@ -5,7 +5,7 @@ The part of a scene between its mirrors, or one period of it, is solved by
 """
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -32,6 +32,7 @@ COST = 3
 
 WIDTH = 1e-2  # of the interval unless given
 
+_ENDS = {"bottom": BOTTOM, "top": TOP}
 _RUNGS = (  # distances of lines from outlines, in electrode gaps; order of the potential; width that it often reaches
     ((2.0, 0.5), 2, 2.5e-2),
     ((0.8, 0.25, 0.08), 2, 1e-2),
@@ -365,22 +366,17 @@ def _numbers(bodies: Sequence[Body], names: Sequence[str]) -> tuple[dict[Body, i
     """Number of each body, of an electrode, of a conductor that floats, or of its dielectric; and of conductors."""
     floating = [body for body in bodies if body.terminal == FLOATING]
     number, conductors = {body: 2 + k for k, body in enumerate(floating)}, 2 + len(floating)
-    ends = {"bottom": BOTTOM, "top": TOP}
-    for body in bodies:
-        if body.terminal in ends:
-            number[body] = ends[body.terminal]
-        elif not body.terminal and body.material != "air":
-            number[body] = conductors + names.index(body.material)
-    return number, conductors
+    number |= {body: _ENDS[body.terminal] for body in bodies if body.terminal in _ENDS}
+    return number | _dielectrics(bodies, conductors, names), conductors
 
 
 def _merged(
     own: Mapping[Body, Region], number: Mapping[Body, int], corner_mm: tuple[float, float] = (0.0, 0.0)
 ) -> dict[int, Region]:
-    """Regions of a slab by number, from a corner; air is left out."""
+    """Regions of a slab by number, from a corner; bodies without a number are left out."""
     by_number: dict[int, list[Region]] = defaultdict(list)
     for body, region in own.items():
-        if body.material != "air" and not region.is_empty:
+        if body in number and not region.is_empty:
             by_number[number[body]].append(translate(region, -corner_mm[0], -corner_mm[1]))
     return {k: shapely.union_all(regions) for k, regions in by_number.items()}
 
@@ -406,12 +402,11 @@ def _numbered(
     low, high = int(slab[kinds == BOTTOM].min()), int(slab[kinds == TOP].max())
     if uncovered:  # the field leaves the electrodes
         low, high = 0, len(inside) - 1
-    names = dielectrics(chain.from_iterable(inside[low : high + 1]))
-    regions = []
+    names, regions = dielectrics(chain.from_iterable(inside[low : high + 1])), []
     for k in range(low, high + 1):
         here = kinds[slab == k]
         metal = {kind: shapely.union_all(plans[slab == k][here == kind]) for kind in np.unique(here).tolist()}
-        regions.append(metal | _dielectrics(inside[k], conductors, names))
+        regions.append(metal | _merged(inside[k], _dielectrics(inside[k], conductors, names)))
     heights = tuple(levels_mm[low : high + 2])
     gap_mm = _gap_mm(regions, heights, conductors)
     if uncovered and not air_mm:
@@ -434,22 +429,16 @@ def _touching(plans: np.ndarray, sizes_mm: tuple[float, float], shifts: tuple[bo
     return np.asarray(pairs % max(len(plans), 1))
 
 
-def _dielectrics(own: Mapping[Body, Region], first: int, names: Sequence[str]) -> dict[int, Region]:
-    """Region of each dielectric of a layer, numbered by its material; air is left out."""
-    by_kind: dict[int, Region] = {}
-    for body, region in own.items():
-        if not body.terminal and body.material != "air" and not region.is_empty:
-            kind = first + names.index(body.material)
-            by_kind[kind] = shapely.union_all([by_kind.get(kind, region), region])
-    return by_kind
+def _dielectrics(bodies: Iterable[Body], first: int, names: Sequence[str]) -> dict[Body, int]:
+    """Number of each body's dielectric, by its material; air is left out."""
+    return {b: first + names.index(b.material) for b in bodies if not b.terminal and b.material != "air"}
 
 
 def _conductors(connected: Sequence[int], terminals: Sequence[str]) -> Whole:
     """Number of the conductor that each piece is a part of; raises ValueError where bottom and top are connected."""
     numbers: dict[int, int] = {}
-    ends = {"bottom": BOTTOM, "top": TOP}
     for piece, terminal in zip(connected, terminals, strict=True):
-        if terminal in ends and numbers.setdefault(piece, ends[terminal]) != ends[terminal]:
+        if terminal in _ENDS and numbers.setdefault(piece, _ENDS[terminal]) != _ENDS[terminal]:
             raise ValueError("the electrodes touch: the capacitance grows without bound")
     for piece in connected:
         numbers.setdefault(piece, len({*numbers.values(), BOTTOM, TOP}))
@@ -458,7 +447,7 @@ def _conductors(connected: Sequence[int], terminals: Sequence[str]) -> Whole:
 
 def _uncovered(plans: np.ndarray, kinds: np.ndarray, sizes_mm: tuple[float, float]) -> str:
     """The electrode that does not cover the whole cell, or ""; raises ValueError where there is none."""
-    own = {name: plans[kinds == end] for end, name in ((BOTTOM, "bottom"), (TOP, "top"))}
+    own = {name: plans[kinds == end] for name, end in _ENDS.items()}
     if missing := [name for name, region in own.items() if not len(region)]:
         raise ValueError(f"the scene has no {missing[0]} electrode")
     whole = _COVERS * sizes_mm[0] * sizes_mm[1]

@@ -4,16 +4,31 @@ Finite volumes on grid lines that follow the contacts, with exact derivatives; s
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Complex
-from sensorgen.core.errors import UnknownName
-from sensorgen.solvers.sheet.parts import Port, Sheet, SheetPatch
-from sensorgen.solvers.sheet.solve import BY, PressErrors, Solution, bounds, solution
+from sensorgen.core.errors import OutOfRange, UnknownName
+from sensorgen.solvers.sheet.parts import Port, Sheet, SheetPatch, check, check_inside, contacts_of
+from sensorgen.solvers.sheet.solve import (
+    BY,
+    PressErrors,
+    SheetProblem,
+    Solution,
+    converged,
+    depth_m,
+    frequencies,
+    on_grid,
+)
 
 SOURCE = "Thesis 7.2.6, and appendix B with current in both directions of the plane"
 COST = 2
+
+_ACCURACY = 3e-2  # of the impedances behind a bound [-]
+_SHALLOWEST = 1 / 20  # depth of the current over the longer side, under which places would take hours [-]
+_ROUNDING = 1e-11  # relative change of an impedance across the sheet [-] below which a derivative is only rounding
 
 
 def impedance(
@@ -126,7 +141,19 @@ def solve(
     >>> found.cells, found.error < 1e-3, round(float(found.by["x_m"][0, 0, 0].real), 1)
     (80, True, 45.7)
     """
-    return solution(sheet, ports, frequency_hz, patch, of, cells, accuracy)
+    names, tones = tuple(of), frequencies(frequency_hz)
+    contacts_of(sheet, ports)
+    if patch:
+        check_inside(
+            "the pressed patch", sheet, (patch.x_m, patch.x_m + patch.length_m), (patch.y_m, patch.y_m + patch.width_m)
+        )
+    for name in names:
+        if name not in BY:
+            raise UnknownName("input of a sheet to differentiate by", name, BY)
+    if names and not patch:
+        raise OutOfRange("a derivative by a patch needs a patch")
+    asked = SheetProblem(sheet, ports, tones, patch, names)
+    return converged(asked, accuracy) if cells is None else on_grid(asked, cells)
 
 
 def localise(
@@ -191,4 +218,39 @@ def localise(
     for name in per_newton:
         if name not in BY:
             raise UnknownName("factor that a force moves", name, BY)
-    return bounds(sheet, ports, frequency_hz, press, per_newton, noise, places, done)
+    check("noise", noise, above=True)
+    if places < 1:
+        raise OutOfRange(f"bounds need one place or more along each side, not {places}")
+    tones = frequencies(frequency_hz)
+    # Refuse frequencies that would compute for hours: cells have to be as small as the depth
+    highest_hz = float(tones.max())
+    depth, side = depth_m(sheet, highest_hz, press), max(sheet.length_m, sheet.width_m)
+    if depth < _SHALLOWEST * side:
+        most = highest_hz * (depth / (_SHALLOWEST * side)) ** 2
+        raise OutOfRange(
+            f"at {highest_hz:g} Hz current reaches {depth:.3g} m; bounds take {_SHALLOWEST:.0%} or more of the sheet's "
+            f"{side:g} m: use frequencies up to {most:.2g} Hz"
+        )
+    middle = _moved(press, (sheet.length_m - press.length_m) / 2, (sheet.width_m - press.width_m) / 2)
+    cells = solve(sheet, ports, tones, middle, accuracy=_ACCURACY).cells
+    x, y = (np.linspace(0.0, end, places) for end in (sheet.length_m - press.length_m, sheet.width_m - press.width_m))
+    information = np.empty((places, places, len(tones), 3, 3))
+    for count, (i, j) in enumerate(np.ndindex(places, places)):
+        if done:
+            done(count)
+        here = solve(sheet, ports, tones, _moved(press, float(x[i]), float(y[j])), BY, cells)
+        z = np.einsum("fpp->fp", here.impedance_ohm)
+        by = {name: np.einsum("fpp->fp", value) / z for name, value in here.by.items()}
+        by_force = sum((by[name] * slope for name, slope in per_newton.items()), np.zeros_like(z))
+        # relative derivatives (3, tones, ports); noise relative to the magnitude in both parts
+        relative = np.stack([by_force, by["x_m"], by["y_m"]])
+        scale = np.array([1.0, sheet.length_m, sheet.width_m])[:, None, None]
+        rows = np.concatenate([relative.real, relative.imag], axis=2) / noise
+        rows[np.abs(rows) * noise * scale < _ROUNDING] = 0.0
+        information[i, j] = np.einsum("afk,bfk->fab", rows, rows)
+    guess = (sheet.length_m / 12**0.5, sheet.width_m / 12**0.5)
+    return PressErrors(x + press.length_m / 2, y + press.width_m / 2, tones, information, guess, cells)
+
+
+def _moved(press: SheetPatch, x_m: float, y_m: float) -> SheetPatch:
+    return replace(press, x_m=max(x_m, 0.0), y_m=max(y_m, 0.0))

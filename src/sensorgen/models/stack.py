@@ -236,7 +236,9 @@ class Stack:
         if not (np.min(frequency_hz) > 0 and touch.isolation_f_per_m > 0 and min(body) > 0):
             raise OutOfRange("a touch needs a frequency, an isolation's capacitance and a body, all above 0")
         r, y, lengths = self.sections(frequency_hz, Press(touch.force_n, touch.left_m, touch.length_m))
-        r, y = multiline.with_body(r, y, touch.admittance_s_per_m(frequency_hz, body))
+        # The body is a track without resistance, coupled under the touch alone
+        touching = touch.admittance_s_per_m(frequency_hz, body)
+        r, y = [[*section, 0.0] for section in r], [[*section, touching * (k == 1)] for k, section in enumerate(y)]
         n = len(self.films) + 1
         across = port(driven, low, n) if driven > low else -port(low, driven, n)
         return multiline.reading(

@@ -352,7 +352,7 @@ def _may_be_smooth(case: Case, level: int) -> bool:
 def _coarser(case: Case, fine: "Pressed", stress_pa: Sequence[float], level: int, *, keep: bool) -> "Pressed":
     """Solution on the next coarser mesh at some pressures of a finer one; unloaded where there is no such mesh."""
     if len(fine.stress_pa) == 1 or _size(case.model, level - 1) == inf:
-        return fine.first(1)
+        return fine.some([0])
     some = few(fine.stress_pa.tolist())
     with suppress(cached.Unknown), cached.only_known():
         if keep:  # the level before was not accurate enough: it is stored

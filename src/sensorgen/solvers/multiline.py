@@ -284,11 +284,6 @@ class Touch(NamedTuple):
         return np.asarray(1 / (skin + 1 / (1j * susceptance)) if np.isfinite(self.isolation_f_per_m) else 1 / skin + 0j)
 
 
-def with_body(r: list[Any], y: list[Any], touching: Complex) -> tuple[list[Any], list[Any]]:
-    """The sections of a touched stack: the body is a track without resistance, coupled under the touch alone."""
-    return [[*section, 0.0] for section in r], [[*section, touching * (k == 1)] for k, section in enumerate(y)]
-
-
 def reading(admittance_s: Complex, across: Real, tie: Real, body_s: Complex, bridge: bool) -> Complex:
     """Reading of the instrument between driven and low track [ohm].
 

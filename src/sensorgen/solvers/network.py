@@ -65,10 +65,6 @@ class StraightLines:
         """Unit vector along each piece, (n, 2) [-]."""
         return np.asarray((self.end_m - self.start_m) / self.length_m()[:, None])
 
-    def goes_on(self) -> Mask:
-        """Mask: true where another piece goes on where this one ends."""
-        return np.append(self.joined[1:], False)
-
     def at(self, piece: Whole, share: Real) -> Real:
         """Places in plan, at a share of a piece's length, (m, 2) [m]."""
         return np.asarray(self.start_m[piece] + share[:, None] * (self.end_m - self.start_m)[piece])
@@ -141,10 +137,6 @@ def interleaved(query: Whole, at: Real) -> tuple[Whole, Real, Real]:
     query, at = query[apart], at[apart]
     step = np.where(np.diff(query) == 0, np.diff(at), 0.0)
     return query, at, (np.append(step, 0.0) + np.append(0.0, step))[: len(at)] / 2
-
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -410,7 +402,7 @@ class _Ends:
         self.room[self.side, self.piece] = room
         self.sines = np.ones((2, len(lines)))
         self.sines[self.side, self.piece] = self.sine
-        self.turns = np.stack([lines.joined, lines.goes_on()])
+        self.turns = np.stack([lines.joined, np.append(lines.joined[1:], False)])  # at a piece's start and end
 
     def links(self, nodes: Nodes) -> Links:
         """Ends on walls; where a line turns, the piece after the turn lies along the wall itself."""

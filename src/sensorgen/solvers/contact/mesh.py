@@ -150,15 +150,11 @@ def _cut(
         ends = [sizes.get(p, wide.coarse_mm if of_block and p[1] == top_mm else fineness.coarse_mm) for p in (a, b)]
         length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
         shares = cuts(length, ends[0], ends[1], wide if of_block else fineness)
-        places = [a, *(_on_way(a, b, share) for share in shares), b]
+        places = [a, *((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])) for share in shares), b]
         open_sides = (sides[0] * cell.solid(sides[0]), sides[1] * cell.solid(sides[1]))
         if open_sides != (OUTSIDE, OUTSIDE):
             pieces |= dict.fromkeys(pairwise(places), open_sides)
     return pieces
-
-
-def _on_way(a: Point, b: Point, share: float) -> Point:
-    return a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
 
 
 def _is_flat(cell: ContactCell, place: Point) -> bool:

@@ -22,13 +22,7 @@ _LEAST_VOLUME = 0.2  # J below which an element's answer is not to be trusted [-
 DEEPEST = 0.3  # penetration over the side it happens on [-]
 _BALANCE = 0.01  # by which work and energy may differ [-]
 _LEVELS = 0.01  # by which two meshes may differ [-]
-_FIRST = (
-    1 / 16,
-    1 / 8,
-    1 / 4,
-    1 / 2,
-    1,
-)  # of the longest load step: steps of a cross-section in which contact begins [-]
+_FIRST = 1 / np.array([16, 8, 4, 2, 1])  # of the longest load step: of a cross-section in which contact begins [-]
 _SETTLED, _UPDATES = 0.005, 8  # of a cross-section: ``settled`` and ``updates`` of its problem
 _NEAR = 0.2  # relative distance of two loads, of which only the one that was asked for is solved [-]
 
@@ -112,7 +106,7 @@ class Pressed:
         holds = self._holds()
         known = self.some([k for k in range(len(self.stress_pa)) if k > last or bounds[k] or not holds[k]])
         n = known.sound_loads()
-        return replace(known.first(n), faults=()) if n > 1 else self
+        return replace(known.some(range(n)), faults=()) if n > 1 else self
 
     def sound_loads(self) -> int:
         """Number of pressures before the first at which a check fails."""
@@ -129,17 +123,12 @@ class Pressed:
 
     def some(self, which: Sequence[int]) -> "Pressed":
         """Some pressures of the curve."""
-        values = {name: getattr(self, name) for name in _BY_LOAD}
         rows: dict[str, Any] = {
-            k: v[which] if isinstance(v, np.ndarray) else tuple(v[i] for i in which)
-            for k, v in values.items()
-            if len(v)
+            name: v[list(which)] if isinstance(v, np.ndarray) else tuple(v[i] for i in which)
+            for name in _BY_LOAD
+            if len(v := getattr(self, name))
         }
         return replace(self, **rows)
-
-    def first(self, n: int) -> "Pressed":
-        """First pressures of the curve."""
-        return replace(self, **{name: getattr(self, name)[:n] for name in _BY_LOAD})
 
 
 @dataclass(frozen=True)
@@ -172,7 +161,7 @@ def solve(
     boundary: BoundaryConditions,
     longest: float,
     source: str,
-    step: Callable[[float], None],
+    step: Callable[[float], None] | None,
 ) -> tuple[Pressed, LoadSteps[AnyMesh]]:
     """Press a mesh of triangles or bricks as far as it converges, and check the result.
 
@@ -190,7 +179,7 @@ def solve(
         Load step over the least Young's modulus, at most [-].
     source : str
         Method.
-    step : callable
+    step : callable, optional
         Called with each pressure that is reached [Pa].
     """
     from sensorgen.solvers.contact.boundary import free_of, top_load
@@ -212,7 +201,7 @@ def solve(
         free = free_of(mesh.points_m, boundary)
         problem = Problem(elements, faces, free, load, penalty, stick, sound=sound, settled=_SETTLED, updates=_UPDATES)
         problem = replace(problem, free=free[:, elimination_order(problem.pattern[0])])
-        ramp = [k * longest * softest for k in _FIRST] if problem.begins_in_contact() else []
+        ramp = (_FIRST * longest * softest).tolist() if problem.begins_in_contact() else []
     else:
         used = np.isin(np.arange(len(mesh.points_m)), mesh.outer)
         free = free_of(mesh.points_m, boundary, mesh.bricks.spans_m(), used)
@@ -225,7 +214,8 @@ def solve(
         every.append(state)
         if state.pressure_pa in stress_pa:
             asked.append(state)
-            step(state.pressure_pa)
+            if step:
+                step(state.pressure_pa)
     return _checked(problem, every, stress_pa, source), LoadSteps(problem, mesh, asked)
 
 

@@ -5,17 +5,15 @@ energies have no scale, so that all rings are one. One ring joined to itself mak
 reduction): a thousand rings take ten steps, and no radius is ever written down, be it 1e-300 of the cell's.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any
 
 import numpy as np
 
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.solvers.electrostatics.elimination import HELD, Block, Numbers, added, eliminated, least
 from sensorgen.solvers.electrostatics.mesh import Cones, Flow
-from sensorgen.solvers.electrostatics.triangles import Edge
 
 SIDES = ((0, 1), (1, 2), (2, 0))  # of a triangle, as pairs of its corners
 
@@ -390,109 +388,94 @@ class PlaneProblem:
 
     Attributes
     ----------
-    mesh : Cones
-        That it lives on.
-    order : int
-        Of the polynomials.
-    plain : (n, k, k) array
-        Energies of the plain triangles.
-    cones : list of (array, array)
-        Energies of a ring's triangles and of the innermost ones, at each singular corner.
+    plane : Plane
+        Mesh that it lives on, and its polynomials.
     weight : (n,) array
         Of each triangle.
-    held : dict of int to int
-        Points whose value is an unknown that others share.
-    walls : set of edge
-        Sides along which it does not change.
-    lifts : dict of int to list of (int, int)
-        As :class:`sensorgen.solvers.electrostatics.mesh.Flow`.
-    count : int
-        Of the unknowns named in ``held`` and ``lifts``, 0 and 1 among them.
+    edge : Flow
+        Boundary: points whose value is an unknown that others share, sides along which the function does not change,
+        and what flows into the top, which is nothing for a potential.
     """
 
-    mesh: Cones
-    order: int
-    plain: Real
-    cones: Sequence[tuple[Real, Real]]
+    plane: "Plane"
     weight: Numbers
-    held: Mapping[int, int]
-    walls: set[Edge]
-    lifts: Mapping[int, Jumps]
-    count: int
+    edge: Flow
 
-    def solved(self, flow: Flow | None = None) -> Field:
+    def solved(self) -> Field:
         """The function of least energy, less twice what flows into the top where a flux is sought."""
-        points = self.mesh.triangles.points
-        plain, cones = self._plain_share(), [self._cone(c, e) for c, e in zip(self.mesh.fans, self.cones, strict=True)]
-        rims = [self._rim(corner, cone.layout) for corner, cone in zip(self.mesh.fans, cones, strict=True)]
-        energies = self.weight[self.mesh.plain, None, None] * self.plain
-        places = points[self.mesh.corners[self.mesh.plain, 0]]
-        blocks, corners = plain.blocks(energies, places), points[list(self.mesh.fans)][:, None]
+        mesh, points = self.plane.mesh, self.plane.mesh.triangles.points
+        plain, cones = self._plain_share(), list(map(self._cone, mesh.fans, self.plane.cone_energies))
+        rims = [self._rim(corner, cone.layout) for corner, cone in zip(mesh.fans, cones, strict=True)]
+        energies = self.weight[mesh.plain, None, None] * self.plane.plain_energy
+        blocks, corners = plain.blocks(energies, points[mesh.corners[mesh.plain, 0]]), points[list(mesh.fans)][:, None]
         for rim, cone, at in zip(rims, cones, corners, strict=True):
             blocks += rim.blocks(cone.matrix[None], at)
-        unknowns = least([*blocks, self._rise(flow)] if flow else blocks, self._unknowns[0]).values()
+        unknowns = least([*blocks, *self._rises()], self._unknowns[0]).values()
         inside = [cone.inside(rim.values(unknowns)[0]) for cone, rim in zip(cones, rims, strict=True)]
         return Field(plain.values(unknowns), inside)
 
     @cached_property
     def _unknowns(self) -> tuple[int, Whole, Whole]:
         """Number of unknowns; the unknown of each point; the first of each side, 0 where it has none."""
-        mesh, count = self.mesh, self.count
+        mesh, held, count = self.plane.mesh, self.edge.held, self.edge.count
         vertex = np.full(len(mesh.triangles.points), -1)
-        vertex[list(self.held)] = list(self.held.values())
+        vertex[list(held)] = list(held.values())
         used = np.unique(mesh.corners[mesh.plain])
         free = used[vertex[used] < 0]
         vertex[free] = count + np.arange(len(free))
         count += len(free)
-        names, modes = mesh.sides[0], self.order - 1
-        open_sides = ~np.isin(names, mesh.names(*np.array(list(self.walls)).reshape(-1, 2).T))
+        names, modes = mesh.sides[0], self.plane.order - 1
+        open_sides = ~np.isin(names, mesh.names(*np.array(list(self.edge.walls)).reshape(-1, 2).T))
         first = np.zeros(len(names), np.int64)
         first[open_sides] = count + modes * np.arange(open_sides.sum())
         return count + modes * int(open_sides.sum()), vertex, first
 
     def _plain_share(self) -> _Share:
-        mesh, (_, vertex, first) = self.mesh, self._unknowns
+        mesh, lifts, (_, vertex, first) = self.plane.mesh, self.edge.lifts, self._unknowns
         corners, at = mesh.triangles.triangles, {n: k for k, n in enumerate(mesh.plain.tolist())}
-        jumps = {at[n]: [(corners[n].index(p), jump) for p, jump in own] for n, own in self.lifts.items() if n in at}
-        return _Share(*numbered(mesh.corners[mesh.plain], vertex, first[mesh.sides[1]], self.order), jumps)
+        jumps = {at[n]: [(corners[n].index(p), jump) for p, jump in own] for n, own in lifts.items() if n in at}
+        return _Share(*numbered(mesh.corners[mesh.plain], vertex, first[mesh.sides[1]], self.plane.order), jumps)
 
     def _cone(self, corner: int, energies: tuple[Real, Real]) -> Cone:
-        fan, (rings, tips) = self.mesh.fans[corner], energies
-        first, last = ((min(corner, end), max(corner, end)) in self.walls for end in (fan.spokes[0], fan.spokes[-1]))
-        layout = RingLayout.of(len(fan.spokes), fan.closed, (first, last), self.order)
+        mesh, (rings, tips) = self.plane.mesh, energies
+        fan, walls = mesh.fans[corner], self.edge.walls
+        first, last = ((min(corner, end), max(corner, end)) in walls for end in (fan.spokes[0], fan.spokes[-1]))
+        layout = RingLayout.of(len(fan.spokes), fan.closed, (first, last), self.plane.order)
         here = self.weight[fan.members][:, None, None]
-        return Cone.of(layout, rings * here[:, None], tips * here, self.mesh.doublings[corner])
+        return Cone.of(layout, rings * here[:, None], tips * here, mesh.doublings[corner])
 
     def _rim(self, corner: int, layout: RingLayout) -> _Share:
         """Values that a cone shares with its neighbours, in its own turn."""
         _, vertex, first = self._unknowns
-        mesh, fan = self.mesh, self.mesh.fans[corner]
+        mesh, fan = self.plane.mesh, self.plane.mesh.fans[corner]
         spokes = np.array(fan.spokes)
         free = spokes[layout.free]
         a, b = spokes[layout.rim].T
         on_side = first[np.searchsorted(mesh.sides[0], mesh.names(a, b))]
-        modes = np.arange(self.order - 1)
+        modes = np.arange(self.plane.order - 1)
         sign = np.where((a > b)[:, None], (-1.0) ** modes, 1.0)
         fixed = vertex[[corner]] if layout.held else vertex[:0]
         ids = np.concatenate([vertex[free], (on_side[:, None] + modes).ravel(), fixed])
         signs = np.concatenate([np.ones(len(free)), sign.ravel(), np.ones(len(fixed))])
-        lifts = {lift for n in fan.members for lift in self.lifts.get(n, ())}
+        lifts = {lift for n in fan.members for lift in self.edge.lifts.get(n, ())}
         jumps = [(free.tolist().index(point), jump) for point, jump in sorted(lifts)]
         return _Share(ids[None], signs[None], {0: jumps} if jumps else {})
 
-    def _rise(self, flow: Flow) -> Block:
-        """Minus the function's rise along the top, as an energy with the unknown 1, whose value is 1."""
+    def _rises(self) -> Iterator[Block]:
+        """Minus the function's rise along the top, as an energy with the unknown 1, whose value is 1; none without."""
+        if not self.edge.top:
+            return
         count, vertex, _ = self._unknowns
-        ends = np.array(flow.top)
+        ends = np.array(self.edge.top)
         start, end = (np.bincount(vertex[e] + 1, minlength=count + 1)[1:] for e in ends.T)  # -1, at cones, cancels
         rise = (end - start).astype(float)
-        for jump, times in flow.rise.items():
+        for jump, times in self.edge.rise.items():
             rise[jump] += times
         where = np.flatnonzero(rise)
         where = where[where >= HELD]
         matrix = np.zeros((len(where) + 1,) * 2)
         matrix[0, 1:] = matrix[1:, 0] = -rise[where]
-        return Block(np.concatenate([[1], where]), matrix, self.mesh.triangles.points[ends[:, 0]].mean(axis=0))
+        yield Block(np.concatenate([[1], where]), matrix, self.plane.mesh.triangles.points[ends[:, 0]].mean(axis=0))
 
 
 @dataclass(frozen=True)
@@ -512,16 +495,15 @@ class Plane:
         """The best potential, 0 V at the bottom and 1 V at the top; ``weight`` (n,) of each triangle."""
         ends = self.mesh.triangles.terminals
         volts = {point: int(name == "top") for edge, name in ends.items() for point in edge}
-        return self._grounded(self._problem(weight, volts, set(ends), {}, HELD).solved())
+        return self._grounded(PlaneProblem(self, weight, Flow(volts, set(ends), {}, [], {}, HELD)).solved())
 
     def stream(self, weight: Numbers) -> Field:
         """The function whose curl is the flux at which twice what flows into the top, less its energy, is most."""
-        flow = self.mesh.flow
-        return self._grounded(self._problem(weight, flow.held, flow.walls, flow.lifts, flow.count).solved(flow))
+        return self._grounded(PlaneProblem(self, weight, self.mesh.flow).solved())
 
     def energies(self, f: Field, g: Field) -> Numbers:
         """Integral of grad f . grad g over each triangle of the mesh."""
-        return self._over(f, g, self._plain_energy, self._cone_energies)
+        return self._over(f, g, self.plain_energy, self.cone_energies)
 
     def crossings(self, f: Field, g: Field) -> Numbers:
         """Integral of grad f . curl g over each triangle of the mesh."""
@@ -530,16 +512,13 @@ class Plane:
 
     def energy_terms(self, f: Field) -> Numbers:
         """Moduli of all terms that :meth:`energies` of ``f`` and its conjugate adds, over each triangle."""
-        size, cones = f.moduli(), [(abs(rings), abs(tips)) for rings, tips in self._cone_energies]
-        return self._over(size, size, abs(self._plain_energy), cones)
+        size, cones = f.moduli(), [(abs(rings), abs(tips)) for rings, tips in self.cone_energies]
+        return self._over(size, size, abs(self.plain_energy), cones)
 
     def crossing_terms(self, f: Field, g: Field) -> Numbers:
         """Moduli of all terms that :meth:`crossings` adds, over each triangle."""
         size = abs(crossed(self.order))
         return self._over(f.moduli(), g.moduli(), size, [(size, size)] * len(f.cones))
-
-    def _problem(self, weight: Numbers, *boundary: Any) -> PlaneProblem:
-        return PlaneProblem(self.mesh, self.order, self._plain_energy, self._cone_energies, weight, *boundary)
 
     def _grounded(self, f: Field) -> Field:
         """Less the value at one end of each triangle's shortest side.
@@ -564,13 +543,13 @@ class Plane:
         return by_triangle
 
     @property
-    def _plain_energy(self) -> Real:
-        """Of the plain triangles (n, k, k)."""
+    def plain_energy(self) -> Real:
+        """Energies of the plain triangles (n, k, k)."""
         return self._matrices[0]
 
     @property
-    def _cone_energies(self) -> list[tuple[Real, Real]]:
-        """Of one ring's triangles (s, 2, k, k) and of the innermost (s, k, k), at each singular corner."""
+    def cone_energies(self) -> list[tuple[Real, Real]]:
+        """Energies of one ring's triangles (s, 2, k, k) and of the innermost (s, k, k), at each singular corner."""
         rings = (m.reshape(-1, 2, *m.shape[1:]) for m in self._matrices[1::2])
         return list(zip(rings, self._matrices[2::2], strict=True))
 

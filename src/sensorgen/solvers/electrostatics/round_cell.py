@@ -1,7 +1,7 @@
 """A cell between mirrors with prisms, bodies of revolution, lofts and polyhedra in it, as plain data."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise, product
 from math import atan, hypot, sqrt
 from typing import Any, NamedTuple
@@ -47,7 +47,7 @@ class RoundCell:
     conductors: int
     permittivity: Sequence[float]
     cuts_mm: tuple[Sequence[float], Sequence[float]] = ((), ())
-    shares: Real | None = None
+    shares: Real = field(default_factory=lambda: np.ones((1, 1)))
 
     def parts(self) -> list[tuple[Sequence[float], Sequence[float]]]:
         """Two corners of each part [mm]."""
@@ -57,7 +57,7 @@ class RoundCell:
 
     def weights(self) -> Real:
         """Number of times that each part occurs beyond the least."""
-        return np.zeros(1) if self.shares is None else np.asarray(self.shares - self.shares.min()).ravel()
+        return np.asarray(self.shares - self.shares.min()).ravel()
 
     def boxes(self) -> list[tuple[Real, Piece, int]]:
         """Spans of each piece in the cell along x, y and z (3, 2) [mm], the piece, and its number."""

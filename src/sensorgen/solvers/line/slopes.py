@@ -1,38 +1,23 @@
 """Exact derivatives of the pressed line by the chain rule along its sections, each computed only on demand."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
-from sensorgen.core.arrays import Complex
-from sensorgen.core.errors import MissingValue, OutOfRange, UnknownName
-from sensorgen.solvers.line.inputs import HIGHEST_OHM, NAMES, Inputs, PressedLine, read
+from sensorgen.core.errors import OutOfRange
+from sensorgen.solvers.line.inputs import HIGHEST_OHM, NAMES, Inputs
 from sensorgen.solvers.line.tanhc import sech_squared, tanhc, tanhc_slope
 
 Array = Any  # of numpy, or one of its scalars
 
 BY = tuple(name for name in NAMES if name != "eps0_f_per_m")
-_OF_PATCH = {"force_n", "modulus_pa", "tip_m"}  # through the strain, which needs an area and a modulus
+OF_PATCH = {"force_n", "modulus_pa", "tip_m"}  # through the strain, which needs an area and a modulus
 
 
-def slopes(line: PressedLine, of: Iterable[str] | None) -> tuple[Complex, dict[str, Complex]]:
-    """Z [ohm] and its derivatives; see :func:`sensorgen.models.line.sensitivities`."""
-    names = tuple(BY if of is None else of)
-    for name in names:
-        if name not in BY:
-            raise UnknownName("input to differentiate by", name, BY)
-    if _OF_PATCH & set(names) and line.modulus_pa is None:
-        raise MissingValue("a derivative by force or patch needs modulus_pa")
-    found = read(line)
-    if _OF_PATCH & set(names) and not found["tip_m"].all():
-        raise OutOfRange("a derivative by force or patch needs a patch: tip_m above 0")
-    first, *rest = found.evaluate(partial(_block, names), 1 + len(names))
-    return first, dict(zip(names, rest, strict=True))
-
-
-def _block(names: tuple[str, ...], inputs: Inputs) -> list[Array]:
+def impedance_and_slopes(names: tuple[str, ...], inputs: Inputs) -> list[Array]:
+    """Z [ohm] and its derivatives by some inputs."""
     with np.errstate(all="ignore"):
         pressed = _Pressed(inputs)
         found = [pressed.z, *(pressed.slope(name) for name in names)]

@@ -176,20 +176,15 @@ def contacts_of(sheet: Sheet, ports: Sequence[Port]) -> tuple[Contact, ...]:
             raise OutOfRange(f"a port between the {plus} and itself reads nothing: give two contacts")
     contacts = tuple(dict.fromkeys(contact for port in ports for contact in port))
     for contact in contacts:
-        _check_inside(f"the {contact}", sheet, contact.x_m, contact.y_m)
+        check_inside(f"the {contact}", sheet, contact.x_m, contact.y_m)
     for one, other in combinations(contacts, 2):
         if one.touches(other):
             raise OutOfRange(f"the {one} and the {other} are shorted: keep them apart, or use one for both")
     return contacts
 
 
-def check_patch(sheet: Sheet, patch: SheetPatch) -> None:
-    """Raise where a patch reaches beyond the sheet."""
-    x, y = (patch.x_m, patch.x_m + patch.length_m), (patch.y_m, patch.y_m + patch.width_m)
-    _check_inside("the pressed patch", sheet, x, y)
-
-
-def _check_inside(what: str, sheet: Sheet, x_m: tuple[float, float], y_m: tuple[float, float]) -> None:
+def check_inside(what: str, sheet: Sheet, x_m: tuple[float, float], y_m: tuple[float, float]) -> None:
+    """Raise where a contact or a patch reaches beyond the sheet."""
     for axis, (start, stop), size in (("x", x_m, sheet.length_m), ("y", y_m, sheet.width_m)):
         if start < -ROUNDING * size or stop > size * (1 + ROUNDING):
             raise OutOfRange(

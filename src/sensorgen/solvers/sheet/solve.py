@@ -1,6 +1,6 @@
 """A sheet as a network of links, solved on a given grid, or on the coarsest that is good enough, with its error."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
+from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.solvers.sheet.parts import (
     SIDES,
     Contact,
@@ -17,8 +17,6 @@ from sensorgen.solvers.sheet.parts import (
     Sheet,
     SheetPatch,
     axes,
-    check,
-    check_patch,
     contacts_of,
     fold,
     folds,
@@ -304,26 +302,8 @@ class Solution:
     error: float
 
 
-def solution(
-    sheet: Sheet, ports: Sequence[Port], frequency_hz: ArrayLike, patch: SheetPatch | None, of: Iterable[str],
-    cells: int | None, accuracy: float,
-) -> Solution:  # fmt: skip
-    """See :func:`sensorgen.models.sheet.solve`."""
-    names, tones = tuple(of), frequencies(frequency_hz)
-    contacts_of(sheet, ports)
-    if patch:
-        check_patch(sheet, patch)
-    for name in names:
-        if name not in BY:
-            raise UnknownName("input of a sheet to differentiate by", name, BY)
-    if names and not patch:
-        raise OutOfRange("a derivative by a patch needs a patch")
-    asked = _Question(sheet, ports, tones, patch, names)
-    return _fine_enough(asked, accuracy) if cells is None else _once(asked, cells)
-
-
 @dataclass(frozen=True)
-class _Question:
+class SheetProblem:
     """A sheet with its ports, frequencies [Hz], patch, and what to differentiate by."""
 
     sheet: Sheet
@@ -363,7 +343,8 @@ def frequencies(given: ArrayLike) -> Real:
     return tones.astype(float)
 
 
-def _once(asked: _Question, cells: int) -> Solution:
+def on_grid(asked: SheetProblem, cells: int) -> Solution:
+    """Impedances on a grid of so many cells along the longer side."""
     if cells < 1:
         raise OutOfRange(f"a sheet needs one cell or more, not {cells}")
     if not folds(asked.ports, asked.patch):
@@ -376,7 +357,7 @@ def _once(asked: _Question, cells: int) -> Solution:
     return Solution(folded.impedance_ohm, by, cells, folded.error)
 
 
-def _unfolded(asked: _Question, cells: int) -> Solution:
+def _unfolded(asked: SheetProblem, cells: int) -> Solution:
     sheet, ports, tones, names = asked.sheet, asked.ports, asked.tones, asked.names
     contacts = contacts_of(sheet, ports)
     grid = axes(sheet, contacts, cells)
@@ -404,14 +385,15 @@ def _unfolded(asked: _Question, cells: int) -> Solution:
     return Solution(z, by, cells, float("nan"))
 
 
-def _fine_enough(asked: _Question, accuracy: float) -> Solution:
+def converged(asked: SheetProblem, accuracy: float) -> Solution:
+    """Impedances on the coarsest grid whose estimated error is within an accuracy."""
     cells = COARSEST
     reach = 2 * max(asked.sheet.length_m, asked.sheet.width_m) / asked.depth_m()
     while cells < reach and cells < FINEST:
         cells *= 2
     before, error = None, float("inf")
     while cells <= FINEST:
-        finer = _once(asked, cells)
+        finer = on_grid(asked, cells)
         if before is not None:
             # Largest change of resistance or reactance, relative to those of the two ports that it couples
             finite = np.isfinite(finer.impedance_ohm)
@@ -431,9 +413,6 @@ def _fine_enough(asked: _Question, accuracy: float) -> Solution:
     )
 
 
-ACCURACY = 3e-2  # of the impedances behind a bound [-]
-SHALLOWEST = 1 / 20  # depth of the current over the longer side, under which places would take hours [-]
-_ROUNDING = 1e-11  # relative change of an impedance across the sheet [-] below which a derivative is only rounding
 _SINGULAR = 1e-13  # smallest eigenvalue of a correlation of derivatives that is distinct from 0 [-]
 
 
@@ -533,46 +512,3 @@ def contact_sets(sheet: Sheet) -> dict[str, tuple[Port, ...]]:
         "corner": (corner(x[0], y[0]),),
         "corners": tuple(corner(at_x, at_y) for at_x in x for at_y in y),
     }
-
-
-def bounds(
-    sheet: Sheet, ports: Sequence[Port], frequency_hz: ArrayLike, press: SheetPatch, per_newton: Mapping[str, float],
-    noise: float, places: int, done: Callable[[int], object] | None,
-) -> PressErrors:  # fmt: skip
-    """Bounds over the sheet; see :func:`sensorgen.models.sheet.localise`."""
-    check("noise", noise, above=True)
-    if places < 1:
-        raise OutOfRange(f"bounds need one place or more along each side, not {places}")
-    tones = frequencies(frequency_hz)
-    # Refuse frequencies that would compute for hours: cells have to be as small as the depth
-    highest_hz = float(tones.max())
-    depth, side = depth_m(sheet, highest_hz, press), max(sheet.length_m, sheet.width_m)
-    if depth < SHALLOWEST * side:
-        most = highest_hz * (depth / (SHALLOWEST * side)) ** 2
-        raise OutOfRange(
-            f"at {highest_hz:g} Hz current reaches {depth:.3g} m; bounds take {SHALLOWEST:.0%} or more of the sheet's "
-            f"{side:g} m: use frequencies up to {most:.2g} Hz"
-        )
-    middle = _moved(press, (sheet.length_m - press.length_m) / 2, (sheet.width_m - press.width_m) / 2)
-    cells = solution(sheet, ports, tones, middle, (), None, ACCURACY).cells
-    x, y = (np.linspace(0.0, end, places) for end in (sheet.length_m - press.length_m, sheet.width_m - press.width_m))
-    information = np.empty((places, places, len(tones), 3, 3))
-    for count, (i, j) in enumerate(np.ndindex(places, places)):
-        if done:
-            done(count)
-        here = solution(sheet, ports, tones, _moved(press, float(x[i]), float(y[j])), BY, cells, ACCURACY)
-        z = np.einsum("fpp->fp", here.impedance_ohm)
-        by = {name: np.einsum("fpp->fp", value) / z for name, value in here.by.items()}
-        by_force = sum((by[name] * slope for name, slope in per_newton.items()), np.zeros_like(z))
-        # relative derivatives (3, tones, ports); noise relative to the magnitude in both parts
-        relative = np.stack([by_force, by["x_m"], by["y_m"]])
-        scale = np.array([1.0, sheet.length_m, sheet.width_m])[:, None, None]
-        rows = np.concatenate([relative.real, relative.imag], axis=2) / noise
-        rows[np.abs(rows) * noise * scale < _ROUNDING] = 0.0
-        information[i, j] = np.einsum("afk,bfk->fab", rows, rows)
-    guess = (sheet.length_m / 12**0.5, sheet.width_m / 12**0.5)
-    return PressErrors(x + press.length_m / 2, y + press.width_m / 2, tones, information, guess, cells)
-
-
-def _moved(press: SheetPatch, x_m: float, y_m: float) -> SheetPatch:
-    return replace(press, x_m=max(x_m, 0.0), y_m=max(y_m, 0.0))
