@@ -20,7 +20,6 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.repetition import Band, SectionCell, Slice, cell
 from sensorgen.scene.scene import Scene, area_mm2, content
 from sensorgen.scene.sections import ROUNDING_MM, Section, square_to
-from sensorgen.solvers.electrostatics import bounds as fem
 
 SOURCE = "Dirichlet's and Thomson's principles for conduction; Rayleigh's cuts where no field is solved"
 COST = 2
@@ -83,7 +82,8 @@ def electrode_resistance(
     """
     if not 0 <= resistivity_ohm_m < np.inf:
         raise OutOfRange(f"resistivity of the {terminal} electrode is {resistivity_ohm_m:g}; expected 0 ohm m or more")
-    fem.check({}, width)
+    if not width > 0:
+        raise OutOfRange(f"accuracy is {width:g}; expected a number above 0, as 1e-4")
     bodies = tuple(replace(b, material=_METAL, terminal="") for b in scene.bodies if b.terminal == terminal)
     alone = Scene(bodies, scene.size_mm)
     if not alone.bodies:
@@ -163,6 +163,7 @@ def _simple(alone: Scene, axis: str, square: list[Section]) -> Interval:
 def _in_plane(alone: Scene, section: Section, width: float) -> Iterator[Interval]:
     """Of one cross-section along the current: bounds that get narrower [1/mm]."""
     from sensorgen.models.fem2d import narrowed
+    from sensorgen.solvers.electrostatics import bounds as fem
     from sensorgen.solvers.electrostatics.triangles import insulated
 
     length, height = alone.size_mm["xyz".index(section.across)], alone.size_mm[2]

@@ -5,7 +5,7 @@ distance of the bounds falls exponentially. See docs/cells.md.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +28,13 @@ COST = 2
 
 WIDTH = 1e-4  # of the interval unless given
 
+Bounded = TypeVar("Bounded", Interval, Disc)
+
 _ORDERS = (3, 20)  # of polynomials: the lowest and the highest
 _CORNER_SHARE = 0.01  # of the wanted width: what may stay unresolved at a corner
 _LOST = 32 * 2.0**-53  # of the moduli of all terms of a sum: what doubles lose of it; up to 4 roundings, measured
 _MOST_DOUBLINGS = 12  # of rings at a corner: 4096 of them
 _GAIN = 1.6  # by which an order lowers the width, in e-folds, as measured
-_STEP = 2  # of orders, where the field is complex
 _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
 
 
@@ -89,19 +90,30 @@ def narrowed(
     """
     values = {material: permittivity[material] for material, _ in coarse.regions}
     mesh = _graded(coarse, values, width)
+
+    def solved(order: int) -> tuple[int, Interval]:
+        energies = _solved(mesh, values, order)
+        return energies.unknowns, interval(energies)
+
+    for order, (unknowns, here) in _orders(solved, width):
+        yield fem.FieldStep(order, mesh.elements(), unknowns, here)
+
+
+def _orders(solved: Callable[[int], tuple[int, Bounded]], width: float) -> Iterator[tuple[int, tuple[int, Bounded]]]:
+    """Unknowns and bounds by rising orders, until these are narrow enough, gain no more, or doubles end."""
     last, order = np.inf, _first(width)
     while order <= _ORDERS[1]:
         try:
-            energies = _solved(mesh, values, order)
-            here = interval(energies)
+            step = solved(order)
         except fem.Unsolved:
             if last == np.inf:
                 raise
-            return  # doubles end here: what was solved before stands
-        yield fem.FieldStep(order, mesh.elements(), energies.unknowns, here)
-        if here.width() <= width or here.width() > _STALLED * last:
+            return  # what was solved before stands
+        yield order, step
+        now = step[1].width()
+        if now <= width or now > _STALLED * last:
             return
-        order, last = order + _more(here.width(), width), here.width()
+        order, last = order + _more(now, width), now
 
 
 def _first(width: float) -> int:
@@ -143,22 +155,13 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     turn = turned(values.values())
     moduli = {material: abs(value) for material, value in values.items()}
     mesh = _graded(coarse, moduli, width)
-    best = _disc(mesh, values, turn, _first(width))
-    for order in range(_first(width) + _STEP, _ORDERS[1] + 1, _STEP):
-        if best.width() <= width:
-            break
-        try:
-            finer = _disc(mesh, values, turn, order)
-        except fem.Unsolved:
-            break  # doubles end here: what was solved before stands
-        gain = finer.width() / best.width()
-        best = min(best, finer, key=Disc.width)
-        if gain > _STALLED:
-            break
+    steps = _orders(lambda order: _disc(mesh, values, turn, order), width)
+    best = min((here for _, (_, here) in steps), key=Disc.width)
     return best.times(EPS0_F_PER_M * M_PER_MM * section.depth_mm)
 
 
-def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order: int) -> Disc:
+def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order: int) -> tuple[int, Disc]:
+    """Unknowns of one order, and where the capacitance lies."""
     plane = Plane(mesh, order)
     eps, weight = _by_triangle(mesh, permittivity)
     rho = np.array([turn.weight[e] for e in eps.tolist()])
@@ -176,7 +179,7 @@ def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order:
         unknowns=plane.unknowns,
         rounding=off / abs(energy.sum()),
     )
-    return disc(fields, turn, [share for _, share in mesh.triangles.regions])
+    return plane.unknowns, disc(fields, turn, [share for _, share in mesh.triangles.regions])
 
 
 def _triangles(scene: Scene) -> tuple[Section, Triangles]:

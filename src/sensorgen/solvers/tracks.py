@@ -155,16 +155,25 @@ class CrossingReadings:
 
     def slopes(self, row: int, column: int) -> Complex:
         """Slopes of one reading by the capacitance of each crossing, (m, n) [S/F]."""
-        u, v = self.by_row[:, :, row], self.by_column[:, :, column]
-        product = -u * v if self.readout == "guarded" else (u - v) ** 2
+        product = self._products(self.by_row[:, :, row], self.by_column[:, :, column])
         return np.asarray(self.factor[row, column] * self.per_farad * product)
+
+    def own_slopes(self) -> Complex:
+        """Slope of each reading by the capacitance of its own crossing, (m, n) [S/F]."""
+        i, j = np.indices(self.siemens.shape)
+        return np.asarray(self.factor * self.per_farad * self._products(self.by_row[i, j, i], self.by_column[i, j, j]))
 
     def matrix(self) -> Complex:
         """Slopes of all readings by all capacitances, (m n, m n): as large as the square of the crossings [S/F]."""
         m, n = self.siemens.shape
         u, v = self._flat()
-        product = -u[:, :, None] * v[:, None, :] if self.readout == "guarded" else (u[:, :, None] - v[:, None, :]) ** 2
-        return np.asarray((product * (self.factor * self.per_farad)).reshape(m * n, m * n).T)
+        return np.asarray(
+            (self._products(u[:, :, None], v[:, None, :]) * (self.factor * self.per_farad)).reshape(m * n, m * n).T
+        )
+
+    def _products(self, u: Complex, v: Complex) -> Complex:
+        """Change of a reading with a crossing's admittance over its factor, by the voltages across the crossing."""
+        return -u * v if self.readout == "guarded" else (u - v) ** 2
 
     def _flat(self) -> tuple[Complex, Complex]:
         m, n = self.siemens.shape

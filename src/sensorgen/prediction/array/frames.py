@@ -15,7 +15,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
 from sensorgen.prediction.array.elements import Past, doubtful_time, flickering
 from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
-from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, broken_where_dead, own_slopes
+from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, broken_where_dead
 from sensorgen.prediction.array.sessions import ArrayCalibration
 from sensorgen.prediction.array.study import DETECTED, DETERMINED
 from sensorgen.prediction.inference import NORMAL_90
@@ -478,7 +478,7 @@ class MapInverter:
         weight = np.concatenate([part.ravel() for part in self._weights(real, imaginary)])
         working = self.read(self.model.capacitances() if at_f is None else at_f)
         if self.model.here.size > MOST_DENSE:
-            slopes = own_slopes(working)
+            slopes = working.own_slopes()
             by = np.stack([slopes.real.ravel(), slopes.imag.ravel()]) * weight.reshape(2, -1)
             variance = 1 / ((by**2).sum(0) + 1 / self.prior_f.ravel() ** 2)
             return by * variance, variance
@@ -534,7 +534,7 @@ class MapInverter:
         """
         if self.model.here.size > MOST_DENSE or self.readout.kind != "guarded":
             return self.alive
-        slopes = own_slopes(self.read(self.model.capacitances()))
+        slopes = self.read(self.model.capacitances()).own_slopes()
         alone = self.readout.sigma_s(self.nominal.siemens) / np.maximum(np.abs(slopes), 1e-30)
         return self.alive & (self._open[1].reshape(alone.shape) < (_MIXED * alone) ** 2)
 

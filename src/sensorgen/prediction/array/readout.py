@@ -87,7 +87,7 @@ def information(
     if m * n > MOST_DENSE:
         total = np.zeros((m, n))
         for one, size in zip(read, sizes, strict=True):
-            own = np.abs(own_slopes(one)) / readout.sigma_s(size)
+            own = np.abs(one.own_slopes()) / readout.sigma_s(size)
             total += own**2
         return total.ravel()
     found = np.zeros((m * n, m * n))
@@ -95,14 +95,6 @@ def information(
         slopes = one.matrix() / readout.sigma_s(size).reshape(-1, 1)
         found += slopes.real.T @ slopes.real + slopes.imag.T @ slopes.imag
     return found
-
-
-def own_slopes(read: CrossingReadings) -> Complex:
-    """Slope of each reading by the capacitance of its own crossing, (m, n) [S/F]."""
-    i, j = np.indices(read.siemens.shape)
-    u, v = read.by_row[i, j, i], read.by_column[i, j, j]
-    product = -u * v if read.readout == "guarded" else (u - v) ** 2
-    return np.asarray(read.factor * read.per_farad * product)
 
 
 def covariance(found: Real, prior_f: Real) -> Real:
@@ -122,7 +114,7 @@ def covariance(found: Real, prior_f: Real) -> Real:
 def crosstalk(read: CrossingReadings) -> Real:
     """Largest effect of another crossing on each reading, relative to that of its own, (m, n) [-]."""
     found = np.empty(read.siemens.shape)
-    own = np.abs(own_slopes(read))
+    own = np.abs(read.own_slopes())
     for i, j in np.ndindex(*found.shape):
         others = np.abs(read.slopes(i, j))
         others[i, j] = 0.0

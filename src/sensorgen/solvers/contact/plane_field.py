@@ -36,7 +36,6 @@ from sensorgen.solvers.contact.element import determinant, triangle_gradients, t
 from sensorgen.solvers.contact.factors import solved_by_lu
 from sensorgen.solvers.contact.mesh import Net, TriangleMesh, nearest, of_triangles, ringed, sharp_corners, triangulated
 from sensorgen.solvers.contact.mesher import Unmeshed
-from sensorgen.solvers.electrostatics.triangles import flipped
 
 Edges = Mapping[Edge, tuple[int, int]]
 
@@ -296,24 +295,11 @@ def _far(a: Point, b: Point) -> float:
 
 
 def filled(ring: Sequence[int], places: Sequence[Point]) -> list[tuple[int, int, int]]:
-    """Triangles of a simple polygon, anticlockwise; its corners may lie on a line. Ears cut off, and edges flipped."""
-    left, ears = list(ring), []
-    while len(left) > 2:
-        k = max(range(len(left)), key=lambda k: _bluntness(left, k, places))
-        ears.append((left[k - 1], left[k], left[(k + 1) % len(left)]))
-        del left[k]
-    return flipped(np.array(places), ears, [0] * len(ears))
-
-
-def _bluntness(ring: Sequence[int], k: int, places: Sequence[Point]) -> float:
-    """Of the ear at a corner: its area over its longest side squared; -1 where another corner lies in it."""
-    names = ring[k - 1], ring[k], ring[(k + 1) % len(ring)]
-    a, b, c = (places[n] for n in names)
-    if any(
-        min(_area(a, b, p), _area(b, c, p), _area(c, a, p)) >= 0 for p in (places[n] for n in ring if n not in names)
-    ):
-        return -1.0
-    return _area(a, b, c) / max(_far(a, b), _far(b, c), _far(c, a)) ** 2
+    """Triangles of a simple polygon, anticlockwise; its corners may lie on a line."""
+    number = {tuple(places[k]): k for k in ring}
+    triangles = shapely.constrained_delaunay_triangles(shapely.Polygon(number))
+    corners = shapely.get_coordinates(shapely.orient_polygons(shapely.get_parts(triangles))).reshape(-1, 4, 2)
+    return [(number[tuple(a)], number[tuple(b)], number[tuple(c)]) for a, b, c, _ in corners.tolist()]
 
 
 def _area(a: Point, b: Point, c: Point) -> float:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Whole
+from sensorgen.scene.connections import groups
 from sensorgen.solvers.electrostatics.elimination import HELD, Numbers
 from sensorgen.solvers.electrostatics.triangles import Edge, Fan, Triangle, Triangles, edges_of, fan, fans
 
@@ -226,8 +227,6 @@ class _Rim:
     ----------
     around : dict of int to Fan
         Triangles at each corner.
-    walls, top : list of edge
-        Mirrors, and the electrode at 1 V.
     loops : dict of int to int
         Of each point on it, the least of those that its edges join it to.
     starts : set of int
@@ -235,38 +234,29 @@ class _Rim:
     """
 
     around: dict[int, Fan]
-    walls: list[Edge]
-    top: list[Edge]
     loops: dict[int, int]
     starts: set[int]
-
-    @classmethod
-    def of(cls, mesh: Triangles) -> "_Rim":
-        """Boundary of a mesh."""
-        around = {corner: found[0] for corner, found in fans(mesh.triangles).items()}
-        rim = [(corner, fan.spokes[0]) for corner, fan in around.items() if not fan.closed]
-        walls = [e for e in rim if _named(e) not in mesh.terminals]
-        top = [e for e in rim if mesh.terminals.get(_named(e)) == "top"]
-        starts = {a for a, b in rim if _named((a, b)) in mesh.terminals}
-        return cls(around, walls, top, _groups(rim), starts)
 
 
 def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
     """Mirrors, cuts and electrode of a mesh whose every corner has one fan; cuts keep away from cones."""
-    rim = _Rim.of(mesh)
-    mirrors, count = _groups(rim.walls), HELD
+    around = {corner: one[0] for corner, one in fans(mesh.triangles).items()}
+    edges = [(corner, fan.spokes[0]) for corner, fan in around.items() if not fan.closed]
+    rim = _Rim(around, _groups(edges), {a for a, b in edges if _named((a, b)) in mesh.terminals})
+    walls = [e for e in edges if _named(e) not in mesh.terminals]
+    top = [e for e in edges if mesh.terminals.get(_named(e)) == "top"]
+    mirrors, count = _groups(walls), HELD
     unknown_of: dict[int, int] = {}
     lifts: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    for piece in _connected(rim.around):
+    for piece in _connected(around):
         values, count = _on_mirrors(piece, mirrors, (piece & rim.loops.keys()) - set(cones), count)
         unknown_of |= values
         start = rim.loops[min(point for point, value in values.items() if value == 0)]
         for path in _cuts(rim, {k: rim.loops[k] for k in piece if k in rim.loops}, start, cones):
-            for number, corner in _beside(rim.around, path):
+            for number, corner in _beside(around, path):
                 lifts[number].append((corner, count))
             count += 1
-    rise = _rise(rim.top, lifts, rim.around)
-    return Flow(unknown_of, {_named(e) for e in rim.walls}, dict(lifts), rim.top, rise, count)
+    return Flow(unknown_of, {_named(e) for e in walls}, dict(lifts), top, _rise(top, lifts, around), count)
 
 
 def _connected(around: Mapping[int, Fan]) -> list[set[int]]:
@@ -306,19 +296,10 @@ def _named(edge: Edge) -> Edge:
 
 def _groups(edges: Iterable[Edge]) -> dict[int, int]:
     """Points that edges join, each with the least of those that it is joined to."""
-    beside: dict[int, list[int]] = defaultdict(list)
-    for a, b in edges:
-        beside[a].append(b)
-        beside[b].append(a)
-    least: dict[int, int] = {}
-    for start in sorted(beside):
-        todo = [start] if start not in least else []
-        while todo:
-            k = todo.pop()
-            if k not in least:
-                least[k] = start
-                todo += beside[k]
-    return least
+    points, at = np.unique(np.array([*edges], np.int64).reshape(-1, 2), return_inverse=True)
+    group = groups(len(points), *at.reshape(-1, 2).T)
+    least = points[np.unique(group, return_index=True)[1]]
+    return dict(zip(points.tolist(), least[group].tolist(), strict=True))
 
 
 def _cuts(rim: _Rim, loops: dict[int, int], start: int, cones: Collection[int]) -> Iterator[list[int]]:
