@@ -114,8 +114,8 @@ def test_phasors_have_the_statistics_of_samples():
     results = []
     gain = tuple((f, 1.05 * np.exp(-0.1j)) for f in TONES_HZ)
     for meter_of in (
-        lambda c, a: Handyscope(str(SERIAL), c, library=SimulatedScope(Capacitor(), c, a)),
-        lambda c, a: PhasorMeter(Capacitor(), c, a, calibrated=False),
+        lambda c, a: Handyscope(str(SERIAL), c, bridge=a, library=SimulatedScope(Capacitor(), c, a)),
+        lambda c, a: PhasorMeter(Capacitor(), c, a),
     ):
         clock = SimulatedClock()
         meter = meter_of(clock, Analyser(gain=gain))

@@ -7,7 +7,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.records import checked
 from sensorgen.design.design import make
 from sensorgen.measure.virtual.mechanics import OPEN_OHM, Mechanics, VirtualRig, VirtualSpecimen, rig_of
-from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, drawn
+from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, VirtualLine, drawn
 
 DESIGN = make({"shape": "reference"})
 TONES_HZ = np.array([1.1e3, 99.7e3])
@@ -118,7 +118,7 @@ def test_moves_with_the_tip_down_and_too_high_forces_are_noted():
 def test_the_reading_is_that_of_the_specimen():
     found = rig(friction_n=0.0)
     specimen = found.specimen
-    line = specimen.line(TONES_HZ)
+    line = VirtualLine(specimen, TONES_HZ)
     assert found.impedance(TONES_HZ) == pytest.approx(line.impedance(0.0, (0.0, 0.0)), rel=1e-9)
     after(found, 2.0, 2.1)
     lift = specimen.rise(3.0, 5e-3)
@@ -127,7 +127,7 @@ def test_the_reading_is_that_of_the_specimen():
 
 def test_readings_have_the_noise_that_was_asked_for():
     noisy = planted(noise=0.01)
-    still = noisy.specimen.line(TONES_HZ).impedance(0.0, (0.0, 0.0))
+    still = VirtualLine(noisy.specimen, TONES_HZ).impedance(0.0, (0.0, 0.0))
     off = np.array([noisy.impedance(TONES_HZ) for _ in range(4000)]) / still - 1
     assert np.hypot(off.real.std(axis=0), off.imag.std(axis=0)) == pytest.approx(0.01 * np.sqrt(2), rel=0.05)
     assert abs(np.corrcoef(off[:, 0].real, off[:, 1].real)[0, 1]) < 0.06
@@ -137,7 +137,7 @@ def test_readings_have_the_noise_that_was_asked_for():
 @pytest.mark.parametrize(("creep", "hysteresis"), [(0.02, 0.0), (0.0, 0.05)])
 def test_creep_goes_with_the_logarithm_of_time_and_hysteresis_with_the_peak(creep, hysteresis):
     found = rig(Truth(creep=creep, hysteresis=hysteresis), friction_n=0.0, lag_s=1e-3)
-    line = found.specimen.line(TONES_HZ)
+    line = VirtualLine(found.specimen, TONES_HZ)
     rest = 1 / line.impedance(0.0, (0.0, 0.0))
 
     def share():
@@ -187,8 +187,8 @@ def test_the_multimeter_reads_the_bottom_electrode():
 
 @pytest.mark.parametrize("bad", [{"stiffness_n_mm": 0.0}, {"friction_n": -1.0}])
 def test_what_no_rig_is_is_refused(bad):
-    with pytest.raises(BadInput, match="expected"):
-        Mechanics(**bad)
+    with pytest.raises(BadInput, match=r"rig\.\w+ is .*; expected"):
+        checked(VirtualSpecimen, {"rig": bad})
 
 
 def planted(*faults, **more):

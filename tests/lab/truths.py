@@ -7,7 +7,7 @@ import numpy as np
 
 from sensorgen.analysis.calibration import Bench, spread_of
 from sensorgen.design.design import make
-from sensorgen.measure.virtual.specimen import PressedSpecimen, drawn
+from sensorgen.measure.virtual.specimen import PressedSpecimen, VirtualLine, drawn
 from sensorgen.prediction import bodies
 from sensorgen.prediction.calibration.calibration import inside
 from sensorgen.prediction.calibration.fitting import Data, calibrated
@@ -50,7 +50,7 @@ class Outcome:
 def session(specimen, count, seed):
     """Random presses, half of them after a higher one, held for 0.3 to 30 s: ratios to the rest before, and rest."""
     rng = np.random.default_rng([seed, 2])
-    truth, line = specimen.truth, specimen.line(TONES_HZ)
+    truth, line = specimen.truth, VirtualLine(specimen, TONES_HZ)
 
     def spread():
         return (rng.permutation(count) + rng.random(count)) / count

@@ -187,7 +187,7 @@ def test_uncertainties_are_those_of_a_disc_around_z(r, x, quantity):
     if r / abs(x) > 30 or abs(x) / r > 30:
         return
     z, f = complex(r, x), 1e3
-    meter = accuracy.Instrument("any", (), "", bands=(accuracy.MeterBand(1, 1e6, 1e-6, 0, 0),))
+    meter = accuracy.Instrument(name="any", source="", bands=(accuracy.MeterBand(1, 1e6, 1e-4, 0, 0),))
 
     def value(z):
         return by_closed_forms(z.real, z.imag, f)[quantity] if quantity != "phase" else cmath.phase(z)

@@ -17,6 +17,9 @@ _EXPECTED: dict[str, str] = json.loads(Path(__file__).with_name("expected.json")
 _OTHERS = "another kind of value"  # that no file of ours can have
 
 
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]*$", examples=["one line without control characters"])]
 
 

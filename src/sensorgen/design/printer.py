@@ -13,13 +13,11 @@ from pydantic import Field, model_validator
 
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.core.records import Line, Strict, checked
+from sensorgen.core.records import Finite, Line, Positive, Strict, checked
 from sensorgen.design import packs
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Pattern = Literal["rectilinear", "grid", "concentric", "honeycomb", "triangles", "gyroid"]  # of infill
 MacroName = Literal["tfree", "tpre", "tpost", "homeall", "bed"]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class MaxSpeed(Strict):

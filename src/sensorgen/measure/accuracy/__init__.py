@@ -13,57 +13,55 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from statistics import mean, stdev
-from typing import Any
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
 
 from sensorgen.core import yamlfile
-from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.core.errors import within
+from sensorgen.core.records import Strict, checked
 from sensorgen.design import packs
 from sensorgen.measure.immittance import impedance, quantity_of
 from sensorgen.measure.log.entries import Reading
 
-_KEYS = {"name", "also", "source", "ranges", "leads_ohm", "bands", "least_ohm", "most_ohm"}
 
-
-@dataclass(frozen=True)
-class MeterRange:
+class MeterRange(NamedTuple):
     """Limits of error of a multimeter in one range.
 
     Attributes
     ----------
     ohm : float
         Full scale [ohm].
-    reading, range : float
-        Limit as shares of the reading and of the range [-].
+    reading_percent, range_percent : float
+        Limit as shares of the reading and of the range [%].
     """
 
     ohm: float
-    reading: float
-    range: float
+    reading_percent: float
+    range_percent: float
 
 
-@dataclass(frozen=True)
-class MeterBand:
+class MeterBand(NamedTuple):
     """Limits of error of an LCR meter in a band of frequencies.
 
     Attributes
     ----------
     from_hz, to_hz : float
         Frequencies [Hz].
-    share : float
-        Of the reading [-].
+    percent : float
+        Of the reading [%].
     short_ohm, open_s : float
         Residual impedance of the short [ohm] and admittance of the open [S].
     """
 
     from_hz: float
     to_hz: float
-    share: float
+    percent: float
     short_ohm: float
     open_s: float
 
 
-@dataclass(frozen=True)
-class Instrument:
+class Instrument(Strict):
     """Specification by an instrument's maker.
 
     Attributes
@@ -84,12 +82,12 @@ class Instrument:
         Impedances between which the specification holds [ohm].
     """
 
-    name: str
-    also: tuple[str, ...]
+    name: Annotated[str, Field(pattern=r"\S", examples=["maker and type"])]
+    also: Annotated[tuple[str, ...], Field(strict=False)] = ()
     source: str
-    ranges: tuple[MeterRange, ...] = ()
+    ranges: Annotated[tuple[MeterRange, ...], Field(strict=False)] = ()
     leads_ohm: float = 0.0
-    bands: tuple[MeterBand, ...] = ()
+    bands: Annotated[tuple[MeterBand, ...], Field(strict=False)] = ()
     least_ohm: float = 0.0
     most_ohm: float = math.inf
 
@@ -99,7 +97,8 @@ class Instrument:
         if limits is None:
             return None
         leads = 0.0 if wires == 4 else self.leads_ohm
-        return (abs(resistance_ohm) * limits.reading + limits.ohm * limits.range + leads) / math.sqrt(3)
+        share = abs(resistance_ohm) * limits.reading_percent + limits.ohm * limits.range_percent
+        return (share / 100 + leads) / math.sqrt(3)
 
     def ac(self, quantity: str, value: float, frequency_hz: float, z_ohm: complex) -> float | None:
         """Standard uncertainty of an AC quantity.
@@ -124,7 +123,7 @@ class Instrument:
         band = next((one for one in self.bands if one.from_hz <= frequency_hz <= one.to_hz), None)
         if band is None or not self.least_ohm <= size <= self.most_ohm:
             return None
-        share = band.share + band.short_ohm / size + size * band.open_s
+        share = band.percent / 100 + band.short_ohm / size + size * band.open_s
         return uncertainty(share / math.sqrt(3), quantity, value, z_ohm)
 
 
@@ -236,26 +235,10 @@ def parse(text: str, where: str) -> Instrument:
     Raises
     ------
     BadInput
-        A key is missing, or is not what it should be.
+        A key is missing, unknown, or is not what it should be.
     """
-    try:
-        return _instrument(yamlfile.parse(text, where))
-    except KeyError as error:
-        raise BadInput(f"{where}: {error.args[0]} is missing") from None
-    except (AttributeError, TypeError, ValueError, ZeroDivisionError):
-        expected = "ranges of [ohm, percent, percent], bands of [Hz, Hz, percent, ohm, S]"
-        raise BadInput(f"{where}: expected name, source, and {expected}") from None
-
-
-def _instrument(data: dict[str, Any]) -> Instrument:
-    if unknown := set(data) - _KEYS:
-        raise UnknownName("key", min(unknown), _KEYS)
-    if not data["name"].split() or not isinstance(data["source"], str):
-        raise ValueError
-    ranges = tuple(MeterRange(ohm, percent / 100, of / 100) for ohm, percent, of in data.get("ranges", ()))
-    bands = tuple(MeterBand(low, high, percent / 100, zs, yo) for low, high, percent, zs, yo in data.get("bands", ()))
-    plain = {name: data[name] for name in ("leads_ohm", "least_ohm", "most_ohm") if name in data}
-    return Instrument(data["name"], tuple(data.get("also", ())), data["source"], ranges, bands=bands, **plain)
+    with within(where):
+        return checked(Instrument, yamlfile.parse(text, where))
 
 
 def is_of(one: Instrument, text: str) -> bool:

@@ -62,10 +62,6 @@ class Kind:
     simulate: Callable[[Plant, Any, Clock], Simulated] | None = None
 
 
-class NoSettings(Strict):
-    """A kind without settings."""
-
-
 class HandyscopeSettings(Strict):
     """Bridge of a Handyscope: feedback [ohm], [F], range of its output [V], and file of its gain per tone."""
 
@@ -272,7 +268,7 @@ def _scpi(name: str) -> Kind:
         )  # fmt: skip
     key = {"hp-34401a": "34401A", "keithley-2000": "MODEL 2000"}[name]
     return _at_port(
-        "meter", NoSettings, lambda line, *_: meters.Multimeter(line, {key: meters.KNOWN[key]}), at,
+        "meter", Strict, lambda line, *_: meters.Multimeter(line, {key: meters.KNOWN[key]}), at,
         lambda plant, _: scpi.SimulatedMultimeter(plant, name),
     )  # fmt: skip
 

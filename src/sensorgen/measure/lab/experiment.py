@@ -13,16 +13,13 @@ from pydantic import AfterValidator, Field, ValidationError, model_validator
 from sensorgen.core import yamlfile
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange, within
-from sensorgen.core.records import Line, Strict, checked, problem
+from sensorgen.core.records import Finite, Line, NotNegative, Positive, Strict, checked, problem
 from sensorgen.measure.signal.presses import GUARD_S, WINDOW_S, RunPlan
 from sensorgen.measure.virtual.mechanics import VirtualSpecimen
 from sensorgen.prediction.query import TONES_HZ
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
-Span = Annotated[tuple[Number, Number], Field(strict=False)]
+Span = Annotated[tuple[Finite, Finite], Field(strict=False)]
 
 
 def _rising(span: tuple[float, float]) -> tuple[float, float]:
@@ -141,7 +138,7 @@ class Approach(Strict):
     landing_mm_s: Positive = 4.0
     travel_mm_s: Positive = 20.0
     rate_n_s: Positive = 20.0
-    place_mm: Number | None = None
+    place_mm: Finite | None = None
 
     def course(self, *stops: tuple[float, float]) -> tuple[tuple[float, float], ...]:
         """Course of the force from the contact on: to each force, where it stays for a time [N], [s]."""
@@ -174,7 +171,7 @@ class Random(Free):
 class Ramp(Strict):
     """Force up and down at a steady rate, at one place."""
 
-    position_mm: Number
+    position_mm: Finite
     force_n: Positive
     rate_n_s: Positive = 1.0
     repeats: Count = 1
@@ -184,7 +181,7 @@ class Ramp(Strict):
 class Hold(Strict):
     """A constant force for long, for creep."""
 
-    position_mm: Number
+    position_mm: Finite
     force_n: Positive
     hold_s: Positive
     rest_s: Positive = 4.0
@@ -193,7 +190,7 @@ class Hold(Strict):
 class Sine(Strict):
     """A force that swings about its mean, for hysteresis."""
 
-    position_mm: Number
+    position_mm: Finite
     mean_n: Positive
     amplitude_n: Positive
     frequency_hz: Annotated[float, Field(gt=0, le=10)]
@@ -534,11 +531,6 @@ def seconds(planned: Sequence[PlannedPress], longest_hold_s: float = 30.0) -> fl
     """About how long a plan takes; one chosen during the run is taken as held for a third of the longest [s]."""
     chosen = longest_hold_s / 3 + AVERAGED_S
     return sum(max(step.rest_s, _TRAVEL_S) + _LANDING_S + (step.seconds if step.course else chosen) for step in planned)
-
-
-def chosen(step: PlannedPress, choice: Choice, approach: Approach) -> PlannedPress:
-    """A step with what was chosen for it."""
-    return replace(choice.press(approach, step.rest_s), number=step.number, part=step.part, kind=step.kind)
 
 
 def _presses(part: Kind, experiment: Experiment, places: tuple[float, float]) -> Iterator[PlannedPress]:

@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -40,17 +40,13 @@ class Controls:
 
     Parameters
     ----------
-    sources : sequence of callable
+    *sources : callable
         Each returns the commands since its last call: "pause", "resume", "abort".
     """
 
-    def __init__(self, sources: Sequence[Callable[[], list[str]]] = ()) -> None:
+    def __init__(self, *sources: Callable[[], list[str]]) -> None:
         self._sources = list(sources)
         self.signal = ""
-
-    def add(self, source: Callable[[], list[str]]) -> None:
-        """One more source."""
-        self._sources.append(source)
 
     def commands(self) -> list[str]:
         """Commands since the last call; a signal aborts."""
@@ -197,7 +193,7 @@ class LiveView:
         self._commands: list[str] = []
         self._last = ""
         token = secrets.token_urlsafe(24)
-        self._server = Server(token, self, self.page)
+        self._server = Server(token, self)
         self.url = f"http://127.0.0.1:{self._server.port}/{token}/"
 
     def __enter__(self) -> Self:
@@ -378,10 +374,8 @@ class Server(ThreadingHTTPServer):
     ----------
     token : str
         First part of every path.
-    served : Served
-        What it serves.
-    page : str
-        Name of the page's files.
+    served : LiveView
+        What it serves, and the name of its page's files.
 
     Attributes
     ----------
@@ -391,7 +385,7 @@ class Server(ThreadingHTTPServer):
 
     daemon_threads, block_on_close = True, False
 
-    def __init__(self, token: str, served: LiveView, page: str = "live") -> None:
+    def __init__(self, token: str, served: LiveView) -> None:
         super().__init__(("127.0.0.1", 0), _Request)
         self.token, self.served = token, served
         self.hosts = {f"{name}:{self.server_address[1]}" for name in ("127.0.0.1", "localhost")}
@@ -399,7 +393,7 @@ class Server(ThreadingHTTPServer):
         folder = resources.files("sensorgen.measure.lab") / "templates"
         self.port = int(self.server_address[1])
         self._thread = threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True, name="live page")
-        files = {"": f"{page}.html"} | {name: name for name in ("live.css", "chart.js", f"{page}.js")}
+        files = {"": f"{served.page}.html"} | {name: name for name in ("live.css", "chart.js", f"{served.page}.js")}
         self.files = {
             name: ((folder / file).read_bytes(), _KINDS[file.partition(".")[2]]) for name, file in files.items()
         }

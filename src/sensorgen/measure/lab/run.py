@@ -162,9 +162,8 @@ def design_of(experiment: Experiment, log: Log | None) -> Design | None:
 
 def run(
     experiment: Experiment, *, clock: Clock, log: Log, rig: RunDevices, simulated: bool, view: RunView | None = None,
-    controls: Controls | None = None, guardian: Guardian | None = None, next_press: NextPress | None = None,
-    predicted: Predicted | None = None, resume: Path | None = None, confirm: Confirm = lambda *_: True,
-    watchdog: bool = True,
+    guardian: Guardian | None = None, next_press: NextPress | None = None, predicted: Predicted | None = None,
+    resume: Path | None = None, confirm: Confirm = lambda *_: True, watchdog: bool = True,
 ) -> RunResult:  # fmt: skip
     """Run an experiment.
 
@@ -180,7 +179,7 @@ def run(
         The devices; they are closed at the end.
     simulated : bool
         Whether the devices are; the log says so.
-    view, controls, guardian, predicted
+    view, guardian, predicted
         As of :class:`sensorgen.measure.lab.press.Loop`.
     next_press : callable, optional
         Chooses the presses of ``next`` parts.
@@ -200,27 +199,18 @@ def run(
     plan = planned(experiment, log)
     if next_press is None and any(part.kind == "next" for part in experiment.plan):
         raise BadInput("plan: a part 'next' needs a model of the specimen; expected other parts here")
-    if watchdog:
-        _check_watchdog(experiment, rig)
-    recorder.recover(log, clock)
-    folder = resume or recorder.new_folder(log.path)
-    with ExitStack() as stack:
-        if not stack.enter_context(recorder.alone(folder)):
-            raise BadInput(f"{str(folder)!r} is a run that goes on in another process; expected one that has ended")
-        attempt = _Attempt(plan, clock, log, rig, folder, simulated, next_press, confirm, watchdog)
-        controls = controls or Controls()
-        if view:
-            controls.add(view.commands)
-        return attempt.result(view, controls, guardian, predicted)
-
-
-def _check_watchdog(experiment: Experiment, rig: RunDevices) -> None:
-    """Refuse forces that would stay on the specimen if run and guardian ended together."""
-    if not isinstance(rig.actuator, SelfLifting) and experiment.limits.force_n > UNWATCHED_N:
+    if watchdog and not isinstance(rig.actuator, SelfLifting) and experiment.limits.force_n > UNWATCHED_N:
         raise BadInput(
             f"limits.force_n: {experiment.limits.force_n:g} N, and this actuator has no watchdog: if run and guardian "
             f"end together, the tip stays down; expected up to {UNWATCHED_N:g} N, or --no-watchdog"
         )
+    recorder.recover(log, clock)
+    folder = resume or recorder.new_folder(log.path)
+    with recorder.alone(folder) as ours:
+        if not ours:
+            raise BadInput(f"{str(folder)!r} is a run that goes on in another process; expected one that has ended")
+        attempt = _Attempt(plan, clock, log, rig, folder, simulated, next_press, confirm, watchdog)
+        return attempt.result(view, guardian, predicted)
 
 
 class _Attempt:
@@ -237,9 +227,7 @@ class _Attempt:
         self.pressed = _pressed(before, plan.steps)
         self.identities: dict[str, Identity] = {}
 
-    def result(
-        self, view: RunView | None, controls: Controls, guardian: Guardian | None, predicted: Predicted | None
-    ) -> RunResult:
+    def result(self, view: RunView | None, guardian: Guardian | None, predicted: Predicted | None) -> RunResult:
         """Do it."""
         experiment = self.plan.experiment
         tones = np.array(experiment.readout.tones_hz)
@@ -247,6 +235,7 @@ class _Attempt:
         recorder.trim(self.folder / recorder.JOURNAL)
         recording = Recorder(self.folder, stem, tones, self.clock)
         self._begin(recording, stem)
+        controls = Controls(view.commands) if view else Controls()
         loop = Loop(
             self.rig, self.clock, recording, experiment, controls, Watch(tones), view, guardian, predicted,
             steps=len(self.plan.steps),
@@ -267,7 +256,7 @@ class _Attempt:
             problems += safety.close(self.rig)
             if end == "done" and problems:
                 end, reason = "fault", f"{reason}, but at the end {problems[0]}"
-        outcome = self._ended(loop, recording, end, reason, up, problems)
+        outcome = self._ended(loop, end, reason, up, problems)
         if fault:
             raise fault
         return outcome
@@ -355,17 +344,16 @@ class _Attempt:
         interval = self.plan.experiment.stop.interval
         if interval and choice.interval <= interval:
             return None
-        next_one = experiments.chosen(step, choice, self.plan.experiment.approach)
+        next_one = choice.press(self.plan.experiment.approach, step.rest_s)
+        next_one = replace(next_one, number=step.number, part=step.part, kind=step.kind)
         experiments.check_press(
             self.plan.experiment, max(next_one.force_n, next_one.peak_n), next_one.place_mm, self.plan.length_mm
         )  # fmt: skip
         return next_one
 
-    def _ended(
-        self, loop: Loop, recording: Recorder, end: str, reason: str, up: bool, problems: tuple[str, ...]
-    ) -> RunResult:
+    def _ended(self, loop: Loop, end: str, reason: str, up: bool, problems: tuple[str, ...]) -> RunResult:
         """Close the files, log them, and tell."""
-        watch = loop.watch
+        watch, recording = loop.watch, loop.recorder
         counts = {"read": watch.count, "lost": watch.lost, "clipped": watch.clipped, "invalid": watch.invalid,
                   "late periods": loop.late}  # fmt: skip
         failed = list(problems)

@@ -24,7 +24,16 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design, Slots
 from sensorgen.design.values import film, material_value, of_all_materials, resistivities
-from sensorgen.measure.virtual.cell import AIR, CellBricks, SectionRaster, Solid, capacitance, conductance, pressed
+from sensorgen.measure.virtual.cell import (
+    AIR,
+    ElementGrid,
+    Solid,
+    brick_grid,
+    capacitance,
+    conductance,
+    pressed,
+    section_grid,
+)
 from sensorgen.scene.scene import FLOATING, Body, Outline, Point, Scene, is_rectangle, seen_from_above
 from sensorgen.scene.sections import Section, SectionColumn, columns, sections
 
@@ -47,7 +56,7 @@ def section_of(scene: Scene) -> Section | None:
     return sections_[0] if len(sections_) == 1 else None
 
 
-def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM) -> SectionRaster:
+def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM) -> ElementGrid:
     """A scene's section as elements.
 
     Parameters
@@ -85,7 +94,8 @@ def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM)
         for share in np.add(at[1:], at[:-1]) / 2:
             kinds.append(_kinds(column, ends, share, materials))
     material, electrode = np.moveaxis(np.array(kinds), 0, 2)
-    return SectionRaster(np.array(x) * M_PER_MM, np.array(z).T * M_PER_MM, material, electrode, scene.repeats[across])
+    x_m, z_m = np.array(x) * M_PER_MM, np.array(z).T * M_PER_MM
+    return section_grid(x_m, z_m, material, electrode, repeats=scene.repeats[across])
 
 
 def graded(count: int) -> Real:
@@ -139,7 +149,7 @@ _COARSER = 1.1
 _INNER = 0.9  # share of a pattern that has to repeat; its ends may be cut
 
 
-def bricks(scene: Scene, materials: Mapping[str, int], size_mm: float, most: int, parts: int = 1) -> CellBricks:
+def bricks(scene: Scene, materials: Mapping[str, int], size_mm: float, most: int, parts: int = 1) -> ElementGrid:
     """A scene between mirrors as bricks; of a symmetric scene the part in its middle that mirrors repeat.
 
     The ends of a scene, where the pattern may be cut, are taken to be as its middle. An outline that is not parallel to
@@ -174,7 +184,7 @@ def bricks(scene: Scene, materials: Mapping[str, int], size_mm: float, most: int
     for axis in range(3):
         kinds = kinds.repeat(parts, axis + 1)
     x, y, z = (_cut(at, parts * n) * M_PER_MM for at, n in zip(part, counts, strict=True))
-    return CellBricks(x, y, z, *kinds)
+    return brick_grid(x, y, z, *kinds)
 
 
 def _pieces(scene: Scene) -> list[tuple[Body, Outline, Point]]:
@@ -277,13 +287,13 @@ _FEWEST = 6  # pressures that a cell has to bear: up to 35 kPa
 _PRESSED, _AT_REST = (0.175, 500), (0.07, 5500)  # longest edge [mm] and number of the coarser bricks
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Blank:
     """Quantities that follow from the body and the design's values.
 
     Attributes
     ----------
-    table_f_per_m : (3, 3, k) nested tuples
+    table_f_per_m : (3, 3, k) array
         By ln of the dielectric's modulus, of its permittivity, and pressure over the modulus' factor, up to the highest
         at which all were solved [F/m].
     track_ohm_per_m : (float, float)
@@ -292,24 +302,21 @@ class Blank:
         Derivative of ln C by the thickness of the film [1/mm].
     """
 
-    table_f_per_m: tuple[tuple[tuple[float, ...], ...], ...]
+    table_f_per_m: Real
     track_ohm_per_m: tuple[float, float]
     by_film_per_mm: float
 
-    @property
-    def _table(self) -> Real:
-        return np.array(self.table_f_per_m)
-
     def capacitance_f_per_m(self, ln_permittivity: float) -> float:
         """At rest, of a dielectric with another permittivity [F/m]."""
-        return exp(float(_between(np.log(self._table[1, :, 0]), _LN_PERMITTIVITY, ln_permittivity)))
+        return exp(float(_between(np.log(self.table_f_per_m[1, :, 0]), _LN_PERMITTIVITY, ln_permittivity)))
 
     def rise(self, ln_permittivity: float, ln_modulus: float) -> tuple[Real, Real]:
         """Pressures [Pa], and the relative rise of C under each, of a dielectric with other values."""
         # a modulus that all materials share scales the pressure exactly; the table holds what their ratio does beside
-        ln = np.log(np.maximum(self._table[:, :, 1:] / self._table[:, :, :1] - 1, 1e-12))
+        table = self.table_f_per_m
+        ln = np.log(np.maximum(table[:, :, 1:] / table[:, :, :1] - 1, 1e-12))
         ratio = np.exp(_between(_between(ln, _LN_MODULUS, ln_modulus), _LN_PERMITTIVITY, ln_permittivity))
-        pressure = np.array(PRESSURES_PA[: self._table.shape[-1]])
+        pressure = np.array(PRESSURES_PA[: table.shape[-1]])
         return pressure * exp(ln_modulus), np.concatenate([[0.0], ratio])
 
 
@@ -349,7 +356,7 @@ def _stored(design: Design) -> Blank:
         "film_mm": design.machine.tool_height_error_mm,
     }  # fmt: skip
     table, by_film_per_mm = answers.answer(question, lambda: _solved(design))
-    return Blank(tuple(tuple(map(tuple, of)) for of in table), tracks(design), by_film_per_mm)
+    return Blank(np.array(table), tracks(design), by_film_per_mm)
 
 
 @cache
@@ -392,9 +399,7 @@ def tracks(design: Design) -> tuple[float, float]:
     return top, bottom
 
 
-def _grids(
-    design: Design, scene: Scene, of: tuple[float, int]
-) -> tuple[SectionRaster | CellBricks, SectionRaster | CellBricks]:
+def _grids(design: Design, scene: Scene, of: tuple[float, int]) -> tuple[ElementGrid, ElementGrid]:
     """A coarse grid of a cell and one of half its elements' size, bricks of a size and number."""
     numbers = {name: k + 1 for k, name in enumerate(_solids(design))}
     if section_of(scene):
@@ -402,10 +407,10 @@ def _grids(
     return bricks(scene, numbers, *of), bricks(scene, numbers, *of, parts=2)
 
 
-def _per_length(design: Design, cell: "PrintCell", grid: SectionRaster | CellBricks) -> float:
+def _per_length(design: Design, cell: "PrintCell", grid: ElementGrid) -> float:
     """Depth of all sections of a sensor over its length [-], or number of cells as of bricks per length [1/m]."""
     x_mm, y_mm, _ = cell.scene.size_mm
-    plan_m2, of_grid = x_mm * y_mm * M_PER_MM**2, float(grid.grid.top_m.sum())
+    plan_m2, of_grid = x_mm * y_mm * M_PER_MM**2, float(grid.top_m.sum())
     return plan_m2 / of_grid * cell.count / (design.params.length_mm * M_PER_MM)
 
 
@@ -419,13 +424,13 @@ def _at_rest(design: Design, scene: Scene, ln_permittivities: Sequence[float]) -
     used = _solids(design)
     number, solids = list(used).index(film(design)), list(used.values())
     return _extrapolated(*(
-        np.array([capacitance(of, _permittivities(solids, number, ln), of.grid.at_m) for ln in ln_permittivities])
+        np.array([capacitance(of, _permittivities(solids, number, ln), of.at_m) for ln in ln_permittivities])
         for of in _grids(design, scene, _AT_REST)
     ))  # fmt: skip
 
 
 def _table(
-    design: Design, grid: SectionRaster | CellBricks, ln_moduli: Sequence[float], ln_permittivities: Sequence[float],
+    design: Design, grid: ElementGrid, ln_moduli: Sequence[float], ln_permittivities: Sequence[float],
     count: int = len(PRESSURES_PA),
 ) -> Real:  # fmt: skip
     """Capacitances of a grid's cell, by ln of modulus, of permittivity, and pressure, of those all reach."""
@@ -436,7 +441,7 @@ def _table(
         solids = list(used.values())
         solids[number] = replace(solids[number], modulus_pa=solids[number].modulus_pa * exp(ln_modulus))
         loads = [p * exp(ln_modulus) for p in PRESSURES_PA[:count]]
-        places = pressed(grid, [AIR, *solids], loads, _FEWEST).place_m
+        places = pressed(grid, [AIR, *solids], loads, _FEWEST)
         rows.append([
             [capacitance(grid, _permittivities(solids, number, ln), place) for place in places]
             for ln in ln_permittivities
@@ -460,13 +465,11 @@ def _by_film(design: Design, scene: Scene) -> float:
     return log(ends[0] / ends[1]) / (2 * by)
 
 
-def _as_track(grid: SectionRaster | CellBricks, electrode: int, *, along: bool) -> float:
+def _as_track(grid: ElementGrid, electrode: int, *, along: bool) -> float:
     """Volume of a plain track that resists as an electrode of the grid's cell: per depth [m2], or of bricks [m3]."""
-    period = float(grid.x_m[-1] - grid.x_m[0])
-    if along or isinstance(grid, CellBricks):
-        return conductance(grid, electrode) * period**2
-    z = (grid.z_m[:, 1:] + grid.z_m[:, :-1]) / 2
-    return float((np.diff(z, axis=0) * np.diff(grid.x_m))[grid.electrode == electrode].sum())
+    if along or grid.at_m.shape[-1] > 2:
+        return conductance(grid, electrode) * float(np.ptp(grid.at_m[..., 0])) ** 2
+    return float(grid.shapes[1][grid.electrode == electrode].sum())
 
 
 def _solids(design: Design) -> Mapping[str, Solid]:

@@ -54,8 +54,10 @@ class ElementGrid:
         Numbers of the elements' corners, in the order of :func:`_corners`.
     at_m : (e, 2^d, d) array
         Where the corners are, the height last [m].
-    material, electrode : (e,) array
-        As of the raster.
+    material : (e,) array
+        Number of each element's material; 0 is air, as above and below.
+    electrode : (e,) array
+        1 at the bottom terminal, 2 at the top one, 0 elsewhere; conductors that float are 3.
     fixed : (n, d) array
         Which displacements of the nodes are zero: all at the base, at the sides those across them.
     top_m : (n,) array
@@ -75,80 +77,54 @@ class ElementGrid:
         return gradients(self.at_m)
 
 
-@dataclass(frozen=True, eq=False)
-class SectionRaster:
-    """A section as a grid of columns, each of them cut into as many rows.
+def section_grid(x_m: Real, z_m: Real, material: Whole, electrode: Whole, *, repeats: bool) -> ElementGrid:
+    """Elements of a section in columns, each of them cut into as many rows.
 
-    Attributes
+    Parameters
     ----------
     x_m : (nx + 1,) array
         Sides of the columns [m].
     z_m : (nz + 1, nx + 1) array
         Heights of the rows' edges at each side [m]; rows may have no height there.
-    material : (nz, nx) array
-        Number of each element's material; 0 is air, as above and below.
-    electrode : (nz, nx) array
-        1 at the bottom terminal, 2 at the top one, 0 elsewhere; conductors that float are 3.
+    material, electrode : (nz, nx) array
+        As of the grid.
     repeats : bool
         Whether the pattern goes on at its sides by shifts, else by mirrors.
     """
-
-    x_m: Real
-    z_m: Real
-    material: Whole
-    electrode: Whole
-    repeats: bool
-
-    @cached_property
-    def grid(self) -> ElementGrid:
-        """Elements of the cell."""
-        z = self.z_m
-        rise = np.diff(z, axis=0) > _FLAT * np.ptp(z)
-        number = np.concatenate([np.zeros((1, z.shape[1]), int), rise.cumsum(0)])  # along each side
-        sides = number[:, :-1] if self.repeats else number
-        number = number + np.concatenate([[0], np.cumsum(sides[-1] + 1)])[: z.shape[1]]
-        if self.repeats:
-            number[:, -1] = number[:, 0]
-        fixed, top = np.zeros((int(number.max()) + 1, 2), bool), np.zeros(int(number.max()) + 1)
-        fixed[number[0]] = True
-        if not self.repeats:
-            fixed[number[:, [0, -1]], 0] = True
-        np.add.at(top, number[-1], _shares(self.x_m))
-        at = np.stack([np.broadcast_to(self.x_m, z.shape), z], -1)
-        free = (rise[:, 1:] | rise[:, :-1]).T.ravel()
-        of = self.material.T.ravel()[free], self.electrode.T.ravel()[free]
-        return ElementGrid(_at_corners(number.T, 2)[free], _at_corners(at.swapaxes(0, 1), 2)[free], *of, fixed, top)
+    rise = np.diff(z_m, axis=0) > _FLAT * np.ptp(z_m)
+    number = np.concatenate([np.zeros((1, z_m.shape[1]), int), rise.cumsum(0)])  # along each side
+    sides = number[:, :-1] if repeats else number
+    number = number + np.concatenate([[0], np.cumsum(sides[-1] + 1)])[: z_m.shape[1]]
+    if repeats:
+        number[:, -1] = number[:, 0]
+    fixed, top = np.zeros((int(number.max()) + 1, 2), bool), np.zeros(int(number.max()) + 1)
+    fixed[number[0]] = True
+    if not repeats:
+        fixed[number[:, [0, -1]], 0] = True
+    np.add.at(top, number[-1], _shares(x_m))
+    at = np.stack([np.broadcast_to(x_m, z_m.shape), z_m], -1)
+    free = (rise[:, 1:] | rise[:, :-1]).T.ravel()
+    of = material.T.ravel()[free], electrode.T.ravel()[free]
+    return ElementGrid(_at_corners(number.T, 2)[free], _at_corners(at.swapaxes(0, 1), 2)[free], *of, fixed, top)
 
 
-@dataclass(frozen=True, eq=False)
-class CellBricks:
-    """A cell as bricks between mirrors, of planes square to x, y and z.
+def brick_grid(x_m: Real, y_m: Real, z_m: Real, material: Whole, electrode: Whole) -> ElementGrid:
+    """Elements of a cell of bricks between mirrors.
 
-    Attributes
+    Parameters
     ----------
     x_m, y_m, z_m : (nx + 1,), (ny + 1,), (nz + 1,) array
-        Places of the planes [m].
+        Places of the planes square to x, y and z [m].
     material, electrode : (nx, ny, nz) array
-        As of :class:`SectionRaster`.
+        As of the grid.
     """
-
-    x_m: Real
-    y_m: Real
-    z_m: Real
-    material: Whole
-    electrode: Whole
-
-    @cached_property
-    def grid(self) -> ElementGrid:
-        """Elements of the cell."""
-        at = np.stack(np.meshgrid(self.x_m, self.y_m, self.z_m, indexing="ij"), -1)
-        number = np.arange(at[..., 0].size).reshape(at.shape[:3])
-        fixed, top = np.zeros((number.size, 3), bool), np.zeros(number.size)
-        fixed[number[..., 0]] = True
-        fixed[number[[0, -1]], 0] = fixed[number[:, [0, -1]], 1] = True
-        top[number[..., -1]] = np.outer(_shares(self.x_m), _shares(self.y_m))
-        of = self.material.ravel(), self.electrode.ravel()
-        return ElementGrid(_at_corners(number, 3), _at_corners(at, 3), *of, fixed, top)
+    at = np.stack(np.meshgrid(x_m, y_m, z_m, indexing="ij"), -1)
+    number = np.arange(at[..., 0].size).reshape(at.shape[:3])
+    fixed, top = np.zeros((number.size, 3), bool), np.zeros(number.size)
+    fixed[number[..., 0]] = True
+    fixed[number[[0, -1]], 0] = fixed[number[:, [0, -1]], 1] = True
+    top[number[..., -1]] = np.outer(_shares(x_m), _shares(y_m))
+    return ElementGrid(_at_corners(number, 3), _at_corners(at, 3), material.ravel(), electrode.ravel(), fixed, top)
 
 
 def _shares(at_m: Real) -> Real:
@@ -189,33 +165,12 @@ def gradients(at_m: Real) -> tuple[Real, Real]:
     return by @ np.linalg.inv(turn), np.linalg.det(turn) / len(corner)
 
 
-@dataclass(frozen=True, eq=False)
-class PressureSeries:
-    """A cell under a series of pressures.
-
-    Attributes
-    ----------
-    pressure_pa : (k,) array
-        On its top, the first 0 [Pa].
-    sink_m : (k,) array
-        Mean displacement of the top, downwards [m].
-    place_m : (k, e, 4, 2) array
-        Displaced corners of the elements [m].
-    """
-
-    pressure_pa: Real
-    sink_m: Real
-    place_m: Real
-
-
-def pressed(
-    raster: SectionRaster | CellBricks, solids: Sequence[Solid], pressure_pa: Sequence[float], least: int | None = None
-) -> PressureSeries:
+def pressed(grid: ElementGrid, solids: Sequence[Solid], pressure_pa: Sequence[float], least: int | None = None) -> Real:
     """Press the top of a cell that stands on a fixed base; its width stays.
 
     Parameters
     ----------
-    raster : SectionRaster or CellBricks
+    grid : ElementGrid
         The section, or the cell.
     solids : sequence of Solid
         Materials by number; the first, of air, counts by its permittivity alone.
@@ -224,15 +179,19 @@ def pressed(
     least : int, optional
         Number of pressures that have to be reached; the others are left out where no equilibrium is found. All if None.
 
+    Returns
+    -------
+    (k, e, 2^d, d) array
+        Displaced corners of the elements, under each pressure that is reached [m].
+
     Raises
     ------
     OutOfRange
         No equilibrium was found at one of the pressures that have to be reached.
     """
-    grid = raster.grid
     body = _Body(grid, solids)
     u, rate = np.zeros(grid.fixed.size), np.zeros(grid.fixed.size)
-    sinks, places = [0.0], [grid.at_m]
+    places = [grid.at_m]
     for before, after in pairwise(pressure_pa):
         at, step = before, after - before
         while at < after - 1e-9 * after and step >= _SMALLEST_STEP * (after - before):
@@ -246,12 +205,11 @@ def pressed(
             u, rate, at = settled, (settled - u) / step, at + step
             step *= 1.5
         if at < after - 1e-9 * after:
-            if len(sinks) < (least or len(pressure_pa)):
+            if len(places) < (least or len(pressure_pa)):
                 raise OutOfRange(f"the cell has no equilibrium that the raster can find above {at / 1e3:.3g} kPa")
             break
-        sinks.append(float(body.load @ u) / float(grid.top_m.sum()))
         places.append(grid.at_m + u.reshape(grid.fixed.shape)[grid.nodes])
-    return PressureSeries(np.array(pressure_pa[: len(sinks)], float), np.array(sinks), np.array(places))
+    return np.array(places)
 
 
 class _Body:
@@ -376,32 +334,29 @@ def _twists(at_m: Real) -> Real:
     return _each_way(np.asarray(most), dimensions)
 
 
-def capacitance(raster: SectionRaster | CellBricks, permittivity: Sequence[float], place_m: Real) -> float:
+def capacitance(grid: ElementGrid, permittivity: Sequence[float], place_m: Real) -> float:
     """Between the electrodes, of a section per depth [F/m], of bricks [F].
 
     Parameters
     ----------
-    raster : SectionRaster or CellBricks
+    grid : ElementGrid
         The section, or the cell.
     permittivity : sequence of float
         Relative, by material; the first of air.
     place_m : (e, 2^d, d) array
         Corners of its elements, displaced [m].
     """
-    grid = raster.grid
     inside = grid.electrode == 0
     by, size = gradients(place_m[inside])
     eps = np.array(permittivity)[grid.material[inside]] * EPSILON_0
     return _flux(_potentials(grid)[grid.nodes[inside]], eps[:, None] * np.abs(size), by)
 
 
-def conductance(raster: SectionRaster | CellBricks, electrode: int) -> float:
+def conductance(grid: ElementGrid, electrode: int) -> float:
     """Of an electrode from the lowest x to the highest, per conductivity: of a section per depth [-], of bricks [m]."""
-    grid = raster.grid
-    inside = grid.electrode == electrode
+    inside, x = grid.electrode == electrode, grid.at_m[..., 0]
     by, size = gradients(grid.at_m[inside])
-    x = grid.at_m[inside][..., 0]
-    left, right = (np.isclose(x, side, rtol=0, atol=1e-9) for side in (raster.x_m[0], raster.x_m[-1]))
+    left, right = (np.isclose(x[inside], side, rtol=0, atol=1e-9) for side in (x.min(), x.max()))
     return _flux(np.where(left, -1, np.where(right, -2, grid.nodes[inside])), size, by)
 
 

@@ -87,9 +87,7 @@ class PhasorMeter:
     clock : Clock
         Of the run.
     analyser : Analyser, optional
-        Bridge, noise and clock.
-    calibrated : bool
-        Whether the readings are corrected by the true gain of the bridge.
+        Bridge, noise and clock; the readings are corrected by the true gain of the bridge.
 
     Attributes
     ----------
@@ -97,10 +95,8 @@ class PhasorMeter:
         Planted fault, or ""; it acts while it is set.
     """
 
-    def __init__(
-        self, plant: Plant, clock: Clock, analyser: Analyser | None = None, *, calibrated: bool = True
-    ) -> None:
-        self.fault, self._calibrated = "", calibrated
+    def __init__(self, plant: Plant, clock: Clock, analyser: Analyser | None = None) -> None:
+        self.fault = ""
         self._plant, self._clock, self._analyser = plant, clock, analyser or Analyser()
         self._noise = np.random.default_rng(self._analyser.seed)
         self._windows: Windows | None = None
@@ -169,8 +165,6 @@ class PhasorMeter:
         noise = self._noise.standard_normal((2, 2, len(self._tones)))
         noisy = (noise[0] + 1j * noise[1]) * self._deviation_v[:, None]
         measured = (self._voltage + noisy[0]) / (output + noisy[1]) * self._transimpedance
-        if not self._calibrated:
-            measured = measured / self._analyser.gains(self._tones)
         return measured, self.fault == "clipped" or self._beyond(output)
 
     def _beyond(self, output: Complex) -> bool:

@@ -1,7 +1,7 @@
 """Simulated rig: piston with weight and friction, tip, stage, specimen as an experiment describes it, and faults."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from math import copysign, exp, inf, sqrt
 from pathlib import Path
@@ -12,8 +12,8 @@ from pydantic import Field, model_validator
 
 from sensorgen.core import yamlfile
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.core.errors import BadInput, UnknownName
-from sensorgen.core.records import Strict
+from sensorgen.core.errors import UnknownName
+from sensorgen.core.records import Finite, NotNegative, Positive, Strict
 from sensorgen.design.design import Design
 from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, VirtualLine, drawn
 
@@ -126,8 +126,7 @@ _INTEGRAL_PER_S = 10.0
 _SECONDS_OF_DRIFT = 1.0  # between steps of the drift
 
 
-@dataclass(frozen=True)
-class Mechanics:
+class Mechanics(Strict):
     """Parts of the rig.
 
     Attributes
@@ -152,24 +151,15 @@ class Mechanics:
         Force on the specimen above which a violation is noted [N].
     """
 
-    weight_n: float = 0.9
-    friction_n: float = 0.2
-    lag_s: float = 2e-3
-    damping_n_s_mm: float = 0.02
-    servo_n_mm: float = 4.0
-    stiffness_n_mm: float = 40.0
-    clearance_mm: float = 30.0
-    stroke_mm: float = 50.0
-    force_limit_n: float = 8.0
-
-    def __post_init__(self) -> None:
-        """Refuse a mechanism that cannot move."""
-        above = ("lag_s", "damping_n_s_mm", "servo_n_mm", "stiffness_n_mm", "stroke_mm", "force_limit_n")
-        for name in above:
-            if not getattr(self, name) > 0:
-                raise BadInput(f"{name} of a virtual rig is {getattr(self, name):g}; expected a number above 0")
-        if not (self.weight_n >= 0 and self.friction_n >= 0):
-            raise BadInput("weight and friction of a virtual rig; expected numbers from 0 on")
+    weight_n: NotNegative = 0.9
+    friction_n: NotNegative = 0.2
+    lag_s: Positive = 2e-3
+    damping_n_s_mm: Positive = 0.02
+    servo_n_mm: Positive = 4.0
+    stiffness_n_mm: Positive = 40.0
+    clearance_mm: Finite = 30.0
+    stroke_mm: Positive = 50.0
+    force_limit_n: Positive = 8.0
 
 
 @dataclass
@@ -325,7 +315,7 @@ class VirtualRig:
             return np.full(len(frequency), OPEN_OHM, complex)
         key = frequency.tobytes()
         if key not in self._lines:
-            self._lines[key] = self.specimen.line(frequency)
+            self._lines[key] = VirtualLine(self.specimen, frequency)
         truth, ends = self.specimen.truth, (0.0, 0.0)
         lift = 0.0
         if self.force_n > 0:
@@ -428,9 +418,6 @@ def _relaxed(dt: float) -> Real:
 _CREPT_AT_1_S = _PER_TIME * float(np.sum(_relaxed(1.0)))
 
 
-Waves = Annotated[tuple[float, ...], Field(strict=False)]
-
-
 class VirtualSpecimen(Strict):
     """The section ``virtual`` of an experiment: what a simulated run presses, and what goes wrong.
 
@@ -440,10 +427,10 @@ class VirtualSpecimen(Strict):
         File or shape; the design of the specimen in the log if None.
     seed : int
         Of materials, errors and drift.
-    truth : mapping
-        Values of :class:`sensorgen.measure.virtual.specimen.Truth` in place of drawn ones.
-    rig : mapping
-        Values of :class:`sensorgen.measure.virtual.mechanics.Mechanics` in place of its defaults.
+    truth : Truth
+        Values that are given in place of drawn ones.
+    rig : Mechanics
+        Piston, tip and stage.
     noise : float
         Relative standard deviation of both parts of a reading, beside the instrument's own noise [-].
     faults : sequence of Planted
@@ -452,19 +439,10 @@ class VirtualSpecimen(Strict):
 
     design: str | None = None
     seed: Annotated[int, Field(ge=0)] = 0
-    truth: dict[str, float | Waves] = Field(default={})
-    rig: dict[str, float] = Field(default={})
+    truth: Truth = Field(default_factory=Truth)
+    rig: Mechanics = Mechanics()
     noise: Annotated[float, Field(ge=0, le=1)] = 0.0
     faults: tuple[Planted, ...] = Field(default=(), strict=False)
-
-    @model_validator(mode="after")
-    def _known(self) -> "VirtualSpecimen":
-        for given, kind in ((self.truth, Truth), (self.rig, Mechanics)):
-            known = [one.name for one in fields(kind)]
-            for name in given:
-                if name not in known:
-                    raise ValueError(str(UnknownName(f"value of a virtual {kind.__name__.lower()}", name, known)))
-        return self
 
 
 def rig_of(settings: VirtualSpecimen, design: Design, tip_m: float) -> VirtualRig:
@@ -484,8 +462,8 @@ def rig_of(settings: VirtualSpecimen, design: Design, tip_m: float) -> VirtualRi
     BadInput, OutOfRange, MissingValue
         A truth, rig or body that cannot be.
     """
-    changes: dict[str, Any] = dict(settings.truth)
-    specimen = PressedSpecimen(design, replace(drawn(design, settings.seed), **changes), tip_m)
-    rig = VirtualRig(specimen, Mechanics(**settings.rig), settings.seed, settings.noise)
-    rig.planted = FaultSchedule(settings.faults)
-    return rig
+    given = {name: getattr(settings.truth, name) for name in settings.truth.model_fields_set}
+    specimen = PressedSpecimen(design, drawn(design, settings.seed).model_copy(update=given), tip_m)
+    return VirtualRig(
+        specimen, settings.rig, settings.seed, settings.noise, planted=FaultSchedule(settings.faults)
+    )  # fmt: skip

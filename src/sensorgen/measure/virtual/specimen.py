@@ -3,26 +3,31 @@
 Written apart from what analyses it: an own solver of the cell (:mod:`.cell`), and an own line, a chain of short pieces.
 """
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import exp, log
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
+from sensorgen.core.records import Finite, NotNegative, Positive, Strict
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.values import ENDS, film, ln_spread, material_value, resistivities
 from sensorgen.measure.virtual.blank import Blank, blank, tracks
 
-PIECES = 60  # of the chain that the line is
+_PIECES = 60  # of the chain that the line is
 _THINNEST_M = 1e-12  # of a piece
 _SIZES = 0.02, 0.01  # of ln R and ln C: thickness and width of printed tracks, width of cells
 
 
-@dataclass(frozen=True)
-class Truth:
+Waves = Annotated[tuple[Finite, ...], Field(strict=False)]
+
+
+class Truth(Strict):
     """True values of one specimen, its leads and its rig; all errors 0 by default.
 
     Attributes
@@ -55,40 +60,28 @@ class Truth:
         A bridge between the electrodes, at a share of the length, and the force above which it opens; none if infinite.
     """
 
-    resistivity: float = 0.0
-    permittivity: float = 0.0
-    modulus: float = 0.0
-    tracks: float = 0.0
-    cells: float = 0.0
-    film_mm: float = 0.0
-    profile: tuple[float, ...] = ()
-    law: tuple[float, ...] = ()
-    leak: float = 0.0
-    dispersion: float = 0.0
-    hysteresis: float = 0.0
-    creep: float = 0.0
-    drift_c: float = 0.0
-    drift_r: float = 0.0
-    drift_s: float = 300.0
-    lead_ohm: float = 0.0
-    stray_f: float = 0.0
-    force_n: float = 0.0
-    position_m: float = 0.0
-    short_ohm: float = np.inf
-    short_share: float = 0.5
-    short_opens_n: float = np.inf
-
-    def __post_init__(self) -> None:
-        """Refuse what no specimen is."""
-        above = ("leak", "drift_c", "drift_r", "lead_ohm", "stray_f", "short_ohm", "short_opens_n")
-        for one in fields(self):
-            value = np.atleast_1d(getattr(self, one.name))
-            if np.isnan(value).any() or (one.name in above and (value < 0).any()):
-                raise BadInput(f"{one.name} of a virtual specimen is {getattr(self, one.name)}; expected 0 or more")
-        if not self.drift_s > 0 or not 0 <= self.short_share <= 1:
-            raise BadInput(
-                f"drift_s {self.drift_s:g}, short_share {self.short_share:g}; expected a time above 0 and a share"
-            )
+    resistivity: Finite = 0.0
+    permittivity: Finite = 0.0
+    modulus: Finite = 0.0
+    tracks: Finite = 0.0
+    cells: Finite = 0.0
+    film_mm: Finite = 0.0
+    profile: Waves = ()
+    law: Waves = ()
+    leak: NotNegative = 0.0
+    dispersion: Finite = 0.0
+    hysteresis: Finite = 0.0
+    creep: Finite = 0.0
+    drift_c: NotNegative = 0.0
+    drift_r: NotNegative = 0.0
+    drift_s: Positive = 300.0
+    lead_ohm: NotNegative = 0.0
+    stray_f: NotNegative = 0.0
+    force_n: Finite = 0.0
+    position_m: Finite = 0.0
+    short_ohm: float = Field(ge=0, default_factory=lambda: np.inf)  # not in the schema: JSON has no infinity
+    short_share: Annotated[float, Field(ge=0, le=1)] = 0.5
+    short_opens_n: float = Field(ge=0, default_factory=lambda: np.inf)
 
 
 def spreads(design: Design) -> dict[str, tuple[float, float]]:
@@ -135,14 +128,11 @@ class PressedSpecimen:
         In what it differs from that.
     tip_m : float
         Length of the tip along the strip [m].
-    pieces : int
-        Of the chain that its line is.
     """
 
     design: Design
     truth: Truth = field(default_factory=Truth)
     tip_m: float = 5e-3
-    pieces: int = PIECES
 
     def __post_init__(self) -> None:
         """Refuse a tip that is none."""
@@ -160,11 +150,6 @@ class PressedSpecimen:
     def length_m(self) -> float:
         """Along the strip [m]."""
         return self.design.params.length_mm * M_PER_MM
-
-    @property
-    def width_m(self) -> float:
-        """Across the strip [m]."""
-        return self.design.params.width_mm * M_PER_MM
 
     def values(self) -> dict[str, float]:
         """True values of the materials, by quantity: of the dielectric, and of the electrodes.
@@ -220,7 +205,7 @@ class PressedSpecimen:
         if force_n <= 0 or felt <= 0 or covered_m <= 0:
             return 0.0
         pressure, rise = self._curve
-        p = felt / (self.width_m * covered_m)
+        p = felt / (self.design.params.width_mm * M_PER_MM * covered_m)
         ratio = float(np.interp(p, pressure, rise))
         if p > pressure[-1]:
             ratio += (p - pressure[-1]) * float((rise[-1] - rise[-3]) / (pressure[-1] - pressure[-3]))
@@ -230,15 +215,18 @@ class PressedSpecimen:
         ratio *= 1 + self.truth.hysteresis * unloading
         return ratio * (1 + self.truth.creep * decades)
 
-    def line(self, frequency_hz: Real) -> "VirtualLine":
-        """Line of the specimen at (m,) frequencies [Hz]."""
-        return VirtualLine(self, frequency_hz)
-
 
 class VirtualLine:
     """The strip at some frequencies: a chain of short pieces of constant values, open at its far end.
 
     What lies left and right of the tip is worked out once for every place.
+
+    Parameters
+    ----------
+    specimen : PressedSpecimen
+        Whose strip it is.
+    frequency_hz : (m,) array
+        Frequencies [Hz].
     """
 
     _STEP = 1e-3
@@ -292,7 +280,7 @@ class VirtualLine:
     def _chain(self, start_m: float, end_m: float, lift: float = 0.0, *, shorted: bool) -> Complex:
         """Matrix of a part of the strip (2, 2, 3, m)."""
         length, truth = self._of.length_m, self._of.truth
-        count = max(int(np.ceil((end_m - start_m) / length * self._of.pieces - 1e-9)), 1)
+        count = max(int(np.ceil((end_m - start_m) / length * _PIECES - 1e-9)), 1)
         edges = np.linspace(start_m, end_m, count + 1)
         middle, size = (edges[1:] + edges[:-1]) / 2, np.maximum(np.diff(edges), _THINNEST_M)
         waves = np.arange(1, len(truth.profile) + 1)
