@@ -43,7 +43,7 @@ def codes(page):
 
 
 def labels():
-    return [labelling.Label.of(p, "film-study", k) for k, p in enumerate(pieces(load(EXAMPLE), EXAMPLE.parent), 1)]
+    return [labelling.Label(p, "film-study", k) for k, p in enumerate(pieces(load(EXAMPLE), EXAMPLE.parent), 1)]
 
 
 def test_every_code_reads_as_its_label_says():
@@ -52,16 +52,16 @@ def test_every_code_reads_as_its_label_says():
     assert len(read) == 20
     for label, text in zip(made, read, strict=True):
         name, batch, design_id = text.split("\n")
-        assert parse(name).name == label.name
-        assert (batch, design_id) == ("film-study", label.design_id)
+        assert parse(name).name == label.piece.name
+        assert (batch, design_id) == ("film-study", label.piece.design_id)
 
 
 def test_the_page_needs_nothing_else_and_holds_text_as_text():
     design = make({"shape": "tri"}).model_copy(update={"name": "<b>&"})
-    label = labelling.Label.of(PrintPiece(named(design, 26, 1), design, design.id()), "a", 1)
+    label = labelling.Label(PrintPiece(named(design, 26, 1), design, "<i>"), "<i>", 1, "<i>")
     page = labelling.page([label], '<script>alert("x")</script>')
     assert "<script" not in page
-    assert "<i>" not in labelling.page([labelling.Label("<i>26", "<i>b", "<i>c", "<i>d", 1)], "a")
+    assert "<i>" not in page
     assert "&lt;b&gt;&amp;" in page
     assert not re.findall(r"(?:src|href)\s*=", page)
     assert set(re.findall(r"https?://[^\"' ]+", page)) <= {"http://www.w3.org/2000/svg"}

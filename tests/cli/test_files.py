@@ -116,7 +116,7 @@ def test_a_pipe_that_nobody_writes_to_is_not_waited_for(real, tmp_path):
     assert "pipe.yaml: not a file" in real("check", "pipe.yaml").line
 
 
-@pytest.mark.parametrize("device", ["/dev/zero", "/dev/random", "/dev/tty", "/dev/stdin"])
+@pytest.mark.parametrize("device", ["/dev/zero", "/dev/stdin"])
 def test_a_device_is_not_read(real, device):
     if not Path(device).exists():
         pytest.skip(f"no {device} here")

@@ -8,11 +8,11 @@ LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))
 COMMANDS = [  # and what they never load; those with fewest modules first, as modules stay
     *((words.split(), HEAVY) for words in (
         "--help", "--version", "build --help", "build tri --help", "batch --help", "completion zsh", "cell tri --help",
-        "log --help", "log multimeter --help", "chart --help", "gcode check --help", "slice tri --help",
+        "log --help", "log multimeter --help", "chart --help", "gcode check --help", "predict tri --help",
         "thesis --help",
     )),
     *((words.split(), CAD) for words in (
-        "list materials", "schema", "check tri", "predict tri", "predict tri --force 0:6:1", "cell reference",
+        "list materials", "schema", "check tri", "predict tri", "predict tri --force 0:6:1 --csv", "cell reference",
         "draw tri -o -",
     )),
     (["build", "tri", "--no-cad"], tuple(name for name in CAD if not name.startswith("sensorgen"))),

@@ -19,14 +19,19 @@ DIVIDES = (
 )
 
 
-@pytest.mark.parametrize("words", [("list", "materials"), ("list", "nothing"), ("--help",)], ids=" ".join)
-@pytest.mark.parametrize("way", ["| true", "2>&1 | true", ">&-", ">&- 2>&-", "2>&-"])
-def test_closed_pipes_and_outputs_are_no_news(words, way, tmp_path):
+@pytest.mark.parametrize(
+    ("words", "codes"),
+    [
+        ("list materials | true", (0,)), ("list materials 2>&1 | true", (0,)), ("list materials >&- 2>&-", (0,)),
+        ("list nothing >&-", (2,)), ("list nothing 2>&-", (2,)),
+        ("--help | true", (0, 1)),  # click's own code for a help that nobody reads
+    ],
+)  # fmt: skip
+def test_closed_pipes_and_outputs_are_no_news(words, codes, tmp_path):
     """The exit code is that of the command, without a message about pipes."""
-    script = f"set -o pipefail; {sys.executable} -m sensorgen {' '.join(words)} {way}"
+    script = f"set -o pipefail; {sys.executable} -m sensorgen {words}"
     done = subprocess.run(["bash", "-c", script], cwd=tmp_path, capture_output=True, encoding="utf-8", check=False)
-    silent = (0, 1) if "--help" in words else (0,)  # click's own code for a help that nobody reads
-    assert done.returncode in ((2,) if "nothing" in words else silent), done
+    assert done.returncode in codes, done
     for word in ("Traceback", "Exception", "Broken", "pipe"):
         assert word not in done.stdout + done.stderr
 

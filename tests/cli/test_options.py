@@ -86,16 +86,6 @@ def test_option_of_every_design(taken, words, expected):
         assert found == value
 
 
-RECT = ("etpu_width_mm", "air_width_mm", "x60_width_mm", "upper_height_mm", "lower_height_mm", "dielectric_mm")
-
-
-@pytest.mark.parametrize("key", RECT)
-def test_every_parameter_of_rect_is_an_option(taken, key):
-    option = "--" + key.removesuffix("_mm").replace("_", "-")
-    assert getattr(taken("rect", option, "0.5").params, key) == 0.5
-    assert getattr(taken("rect", "--set", f"{key}=0.5").params, key) == 0.5
-
-
 WHOLE = """
 name: whole
 shape: tri

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import Field, asdict, dataclass, fields
+from dataclasses import Field, asdict, dataclass, fields, replace
 from typing import Any
 
 from sensorgen import models as model_files
@@ -67,8 +67,8 @@ def _of_packs(kind: Kind, entry: Callable[[packs.File], ListEntry]) -> Catalogue
         version = ""
         with suppress(SensorgenError):
             version = file.pack.version
-        origin = ListEntry(listed.about, listed.values, file.pack.name, version, file.pack.where, str(file.path))
-        entries.setdefault(file.name, origin)
+        pack, path = file.pack, str(file.path)
+        entries.setdefault(file.name, replace(listed, pack=pack.name, version=version, where=pack.where, file=path))
     return Catalogue(dict(sorted(entries.items())))
 
 
@@ -78,7 +78,8 @@ def shapes() -> Catalogue:
 
 
 def _form(file: packs.File) -> shape_files.Shape:
-    return design.shape(file.name) if file.pack.where == "shipped" else shape_files.load(file.name, file.text())
+    text = file.own_text
+    return design.shape(file.name) if text is None else shape_files.load(file.name, text)
 
 
 def _shape(file: packs.File) -> ListEntry:
@@ -102,7 +103,8 @@ def materials() -> Catalogue:
 
 
 def _material(file: packs.File) -> ListEntry:
-    texts: material_files.Texts = {} if file.pack.where == "shipped" else {"materials": {file.name: file.text()}}
+    text = file.own_text
+    texts: material_files.Texts = {} if text is None else {"materials": {file.name: text}}
     m = material_files.load(file.name, packs.source_names(), texts)
     return ListEntry(f"{m.title}: {m.about}", tuple(_values(m)))
 
@@ -117,11 +119,7 @@ def _values(material: material_files.Material) -> Iterator[str]:
 
 def printers() -> Catalogue:
     """Printers with bed, tools and nozzle."""
-    return _of_packs("printers", lambda file: _printer(printer.load_printer(file.name, _text(file))))
-
-
-def _text(file: packs.File) -> str | None:
-    return None if file.pack.where == "shipped" else file.text()
+    return _of_packs("printers", lambda file: _printer(printer.load_printer(file.name, file.own_text)))
 
 
 def _printer(p: printer.Printer) -> ListEntry:
@@ -135,7 +133,7 @@ def qualities() -> Catalogue:
     """Print qualities with their layers."""
 
     def entry(file: packs.File) -> ListEntry:
-        q = printer.load_quality(file.name, _text(file))
+        q = printer.load_quality(file.name, file.own_text)
         return ListEntry(q.title, (f"layers {q.layer_mm:g} mm, first {q.first_layer_mm:g} mm",))
 
     return _of_packs("qualities", entry)

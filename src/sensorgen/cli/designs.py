@@ -51,7 +51,7 @@ class DesignGroup(commands.FirstWord):
     ) -> None:  # fmt: skip
         """Command of a function, which gets the design and the values of its own options; ``more`` come after them.
 
-        ``parts`` names the designs that it is done with in turn, by the design and these values.
+        ``parts`` names the designs that it is done with in turn in place of an array, by it and these values.
         """
         super().__init__(
             name,
@@ -62,7 +62,7 @@ class DesignGroup(commands.FirstWord):
             epilog="SHAPE --help lists the options of the shape and of its print, too.",
             **attributes,
         )
-        self.parts = parts or (lambda design, _: (design,))
+        self.parts = parts
         self.own = [*(options_of(_TipOption) if tip else []), *options_of(work), *more]
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
@@ -94,7 +94,8 @@ class DesignGroup(commands.FirstWord):
         def run(**given: Any) -> int:
             own = {p.name: given.pop(p.name) for p in self.own if p.name in given}
             given["tip"] = own.pop("tip", None)
-            parts = list(self.parts(_design(base, given, name), own))
+            design = _design(base, given, name)
+            parts = self.parts(design, own) if self.parts and design.layout else (design,)
             _refuse_one_result(len(parts), own)
             return max(commands.ended(self.work(part, **arguments(self.work, own))) for part in parts)
 

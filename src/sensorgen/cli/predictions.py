@@ -133,16 +133,8 @@ def _answer(design: "Design", body: BodyChoice, query: Query, pressing: Pressing
 
 def _deliver(result: Any, *, detailed: bool, explain: bool) -> None:
     """Deliver a prediction, loaded or not, its first screen alone if it is not detailed."""
-    from sensorgen.prediction.results import Overview, Prediction
-
     before = getattr(result, "prediction", result).explained() if explain else ()
-    if not detailed and isinstance(result, Prediction):
-        result = Overview(**vars(result))
-    elif not detailed:
-        from sensorgen.prediction.loaded import LoadedOverview
-
-        result = LoadedOverview(result.prediction, result.model, result.axes, result.noise, result.left_out)
-    render.deliver(result, before=before)
+    render.deliver(result, before=before, shown=None if detailed else result.overview())
 
 
 def _plot(result: "Loaded", folder: Path) -> None:

@@ -16,17 +16,15 @@ from sensorgen.design.walls import SLICERS
 from sensorgen.export.slicers import TIME_LIMIT_S
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
-    from sensorgen.core.document import Documented
+    from sensorgen.core.document import Documented, Part
     from sensorgen.design.design import Design
     from sensorgen.workflows.sealed import Differences
 
 
 def _tiles(design: "Design", _: dict[str, Any]) -> "Sequence[Design]":
-    """Tiles of an array that the bed does not hold, one of each kind; else the design."""
-    if not design.layout:
-        return (design,)
+    """Tiles of an array that the bed does not hold, one of each kind; else the array."""
     from sensorgen.workflows.tiles import tiles
 
     kinds = {(t.rows, t.columns, str(each.parameters["seams"])): each for t, each in reversed(tiles(design))}
@@ -58,18 +56,16 @@ def check_command(design: "Design", advising: Advising, *, strict: Strict = Fals
     return 1 if review.errors(strict) or review.verdict == "CHANGE" else 0
 
 
-def _shown(decided: "Documented") -> None:
+def _shown(decided: "Documented", shown: "Iterable[Part] | None" = None) -> None:
     """Deliver what is decided to a terminal, before what takes longer."""
     if render.early():
         render.clear()
         with unread():
-            render.deliver(decided)
+            render.deliver(decided, shown=shown)
 
 
 def _all_tiles(design: "Design", given: dict[str, Any]) -> "Sequence[Design]":
-    """Tiles of an array that the bed does not hold, with a table of their places; else the design."""
-    if not design.layout:
-        return (design,)
+    """Tiles of an array that the bed does not hold, with a table of their places; else the array."""
     from sensorgen.core import document
     from sensorgen.workflows import tiles
 
@@ -77,7 +73,7 @@ def _all_tiles(design: "Design", given: dict[str, Any]) -> "Sequence[Design]":
     if not placed:
         return (design,)
     where = Path(given["out"]) / f"{design.name}-tiles.csv"
-    content = document.comma_separated(tiles.table(placed))
+    content = document.comma_separated(document.Table.of("tiles", "", [tile for tile, _ in placed]))
     render.file(where, content, f"{len(placed)} tiles, as it does not fit the bed: ")
     return [tile for _, tile in placed]
 
@@ -105,7 +101,7 @@ def build_command(
         Also try changes that remove findings, as sensorgen check does.
     """
     from sensorgen.core import document
-    from sensorgen.workflows.build import STEPS, Built, DetailedBuild, build
+    from sensorgen.workflows.build import STEPS, Built, build
 
     if verify:
         from sensorgen.workflows.sealed import build_differences
@@ -114,21 +110,24 @@ def build_command(
             return _told(build_differences(out / design.name, design, log))
     asked = design
     design, changes = compensated(design, compensate)
-    kind, budget_s = DetailedBuild if details else Built, advising.budget if advise or advising.apply else None
+    budget_s = advising.budget if advise or advising.apply else None
+
+    def parts(built: Built) -> "Iterable[Part]":
+        return built.details() if details else built.document()
 
     try:
         with render.progress(STEPS) as step:
             built = build(
                 design, out, cad=not no_cad, force=force, strict=strict, compensated=changes,
                 asked=asked if changes else None, budget_s=budget_s, step=step,
-                decided=lambda built: _shown(kind(**vars(built))),
+                decided=lambda built: _shown(built, parts(built)),
             )  # fmt: skip
     except Unprintable as error:
         return _refuse(design, error, budget_s, advising)
     if render.early():
         render.say("\n".join(document.text(built.written())))
     else:
-        render.deliver(kind(**vars(built)))
+        render.deliver(built, shown=parts(built))
     advising.write(design, built.advice)
     return 1 if built.verdict == "CHANGE" and not force else 0
 

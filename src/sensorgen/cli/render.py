@@ -143,17 +143,19 @@ def refuse_beside(option: str) -> None:
         raise BadInput(f"--{asked[0]} and {option} at once; expected one of them")
 
 
-def deliver(result: "Documented", *, before: "Iterable[Part]" = ()) -> None:
+def deliver(result: "Documented", *, before: "Iterable[Part]" = (), shown: "Iterable[Part] | None" = None) -> None:
     """Print a result in the form that was asked for, or write it to the file; an existing one is replaced whole.
 
     Parameters
     ----------
     result : Documented
-        What is shown.
+        What CSV and JSON have.
     before : iterable of Part
-        What people read before it; CSV and JSON leave it out.
+        What people read before it.
+    shown : iterable of Part, optional
+        What people read of it; its document if not given.
     """
-    write(pieces(result, form(), before))
+    write(pieces(result, form(), before, shown))
 
 
 @contextmanager
@@ -170,8 +172,10 @@ def refused(name: str) -> Iterator[None]:
         raise
 
 
-def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> Iterable[str]:
-    """A result as pieces of text.
+def pieces(
+    result: "Documented", wanted: str, before: "Iterable[Part]" = (), shown: "Iterable[Part] | None" = None
+) -> Iterable[str]:
+    """A result as pieces of text; parameters as of :func:`deliver`.
 
     Raises
     ------
@@ -194,8 +198,8 @@ def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> 
         if not tables:
             raise BadInput("--csv: this result has no table; expected --json")
         return [document.comma_separated(tables[0])]
-    shown = document.markdown if wanted else document.text
-    lines = shown([*before, *result.document()])
+    words = document.markdown if wanted else document.text
+    lines = words([*before, *(result.document() if shown is None else shown)])
     return (f"{line}\n" for line in lines)
 
 

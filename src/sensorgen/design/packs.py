@@ -130,6 +130,11 @@ class File:
         """Content; raises BadInput where it cannot be read, is too large, or a link leads out of the pack."""
         return _text(self.path, dict(self.pack.moved).get(self.kind, self.pack.folder))
 
+    @property
+    def own_text(self) -> str | None:
+        """Content of a file that does not ship."""
+        return None if self.pack.where == "shipped" else self.text()
+
 
 def suffix(kind: Kind) -> str:
     """Ending of the names of files of a kind."""

@@ -387,12 +387,8 @@ class Loaded(Displayed):
         """R and X, a row per force and position, as :func:`sensorgen.prediction.loaded.csv_blocks`."""
         return csv_blocks(self.model.sensor, *self.axes)
 
-
-class LoadedOverview(Loaded):
-    """A loaded prediction whose document is its first screen."""
-
-    def document(self) -> Iterator[Part]:
-        """Ranges of R and X, corners at the last frequency, and the verdict on a press."""
+    def overview(self) -> Iterator[Part]:
+        """The first screen: ranges of R and X, corners at the last frequency, and the verdict on a press."""
         yield from self._ranges()
         known = self.prediction.identifiability
         verdict = f"{known.verdict}." if known else f"no load: {self.prediction.reason}"

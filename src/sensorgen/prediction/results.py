@@ -550,14 +550,10 @@ class Prediction(Boundless, Displayed):
         best = "error unknown" if reached in (None, inf) else f"{reached:.2g}"
         return ("; ".join((f"accuracy {accuracy:g} not reached: {best}", *(self.plan.shares() if self.plan else ()))),)
 
-
-class Overview(Prediction):
-    """A prediction whose document is its first screen."""
-
-    def document(self) -> Iterator[Part]:
-        """Numbers on a bench, what narrows them, and what is doubtful."""
+    def overview(self) -> Iterator[Part]:
+        """The first screen: numbers on a bench, what narrows them, and what is doubtful."""
         if self.capacitance is None:
-            yield from super().document()
+            yield from self.document()
             return
         yield self.design
         yield from self.summary()

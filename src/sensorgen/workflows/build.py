@@ -94,6 +94,14 @@ class Built(Boundless, Displayed):
         yield ""
         yield from self.written()
 
+    def details(self) -> Iterator[Part]:
+        """Verdict, all findings, and the whole prediction."""
+        yield from self._head()
+        yield from listed(self.findings)
+        yield ""
+        yield from self.prediction.document()
+        yield from self.written()
+
     def table(self) -> Table:
         """Quantities of the prediction, as numbers."""
         return self.prediction.table()
@@ -109,19 +117,6 @@ class Built(Boundless, Displayed):
         predicted = self.prediction.status != "not predicted"
         yield headline(self.name, self.findings, self.source, predicted=predicted)
         yield ""
-
-
-@dataclass(frozen=True)
-class DetailedBuild(Built):
-    """A build that shows people everything."""
-
-    def document(self) -> Iterator[Part]:
-        """Verdict, all findings, and the whole prediction."""
-        yield from self._head()
-        yield from listed(self.findings)
-        yield ""
-        yield from self.prediction.document()
-        yield from self.written()
 
 
 def build(

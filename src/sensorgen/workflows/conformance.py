@@ -382,8 +382,7 @@ def _volume_faults(scene: Scene, fill: Fill) -> Faults:
 
 
 def _printer(file: File) -> Faults:
-    own_text = None if file.pack.where == "shipped" else file.text()
-    machine_, quality = printer.load_printer(file.name, own_text), printer.load_quality("fine")
+    machine_, quality = printer.load_printer(file.name, file.own_text), printer.load_quality("fine")
     layer_mm = max(quality.layer_mm, machine_.min_layer_mm)
     quality = quality.model_copy(update={"layer_mm": layer_mm, "first_layer_mm": layer_mm})
     loads = dict(zip(machine_.tool_numbers, map(ToolLoad, map(materials.load, ("etpu", "x60"))), strict=False))
@@ -395,7 +394,7 @@ def _printer(file: File) -> Faults:
 
 
 def _quality(file: File) -> Faults:
-    quality = printer.load_quality(file.name, None if file.pack.where == "shipped" else file.text())
+    quality = printer.load_quality(file.name, file.own_text)
     errors = []
     for name in printer.printer_names():
         machine_ = printer.load_printer(name)

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sensorgen.checks.review import STEPS as CHECKS
@@ -144,15 +143,13 @@ def decision(
 PAGE_STEPS = (*CHECKS, "prediction", "page", "done")
 
 
-def page_of(design: Design, *, folder: Path | None = None, step: Step = lambda _: None) -> str:
+def page_of(design: Design, *, step: Step = lambda _: None) -> str:
     """The page of a design, as HTML, with advice where it is stored.
 
     Parameters
     ----------
     design : Design
         What is shown.
-    folder : Path, optional
-        With the design's files, as of :func:`sensorgen.workflows.trial.trial`.
     step : callable
         Called with the next step, for a progress display.
 
@@ -161,7 +158,7 @@ def page_of(design: Design, *, folder: Path | None = None, step: Step = lambda _
     SensorgenError
         A name or value of the design is missing.
     """
-    printing = reviewed(design, step, folder=folder)
+    printing = reviewed(design, step)
     decided = decision(design, printing, 0.0, step=step)
     predicted = evaluate(bodies.of_file(design, printing.file))
     step("page")

@@ -122,7 +122,16 @@ def slice_design(
         **vars(report), gcode=names[0], verdict=whole.verdict, all_findings=tuple(whole.findings),
         compensated=tuple(compensated),
     )  # fmt: skip
-    return _written(result, design, out, sliced.content, _page(sliced, whole.findings), others)
+    folder, page = out / design.name, _page(sliced, whole.findings)
+    store.replace(folder / names[0], sliced.content)
+    if compensated:
+        store.replace(folder / "design.json", json_bytes(design.model_dump(mode="json")))
+    store.replace(folder / names[1], document.to_json(result).encode())
+    if page:
+        store.replace(folder / f"{stem}.layers.html", page.encode())
+    for old in others:
+        (folder / old).unlink(missing_ok=True)
+    return replace(result, gcode=str(folder / names[0]))
 
 
 def _page(sliced: NewSlice, findings: Sequence[Finding]) -> str:
@@ -139,21 +148,3 @@ def _reviewed(design: Design, slicer: str, program: str) -> PrintReview:
         return reviewed(design, slicer="" if program else slicer)
     except SensorgenError:
         return reviewed(design, slicer=NONE)
-
-
-def _written(
-    result: SlicedFile, design: Design, out: Path, content: bytes, page: str, others: tuple[str, ...]
-) -> SlicedFile:  # fmt: skip
-    """Put the files in place, and take away those that an earlier run has left under the other name."""
-    folder = out / design.name
-    store.replace(folder / result.gcode, content)
-    if result.compensated:
-        store.replace(folder / "design.json", json_bytes(design.model_dump(mode="json")))
-    stem = result.gcode.removesuffix(".gcode").removesuffix(".refused")
-    note = f"{stem}.refused.json" if result.refused else f"{result.gcode}.json"
-    store.replace(folder / note, document.to_json(result).encode())
-    if page:
-        store.replace(folder / f"{stem}.layers.html", page.encode())
-    for old in others:
-        (folder / old).unlink(missing_ok=True)
-    return replace(result, gcode=str(folder / result.gcode))

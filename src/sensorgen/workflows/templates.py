@@ -3,7 +3,6 @@
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from sensorgen.core import files, yamlfile
 from sensorgen.core.document import Part
@@ -11,12 +10,8 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design import packs
 from sensorgen.design.packs import Kind
 
-What = Literal["material", "shape", "printer", "quality", "instrument", "design", "target", "experiment"]
-KINDS: dict[What, Kind | None] = {
-    "material": "materials", "shape": "shapes", "printer": "printers", "quality": "qualities",
-    "instrument": "instruments", "design": None, "target": None, "experiment": None,
-}  # fmt: skip
-_NEXT: dict[What, str] = {
+_KINDS: dict[str, Kind] = {singular: kind for kind, singular in packs.SINGULAR.items()}
+_NEXT = {
     "material": "replace its numbers; then sensorgen pack test {file}, and --material electrode={name} in any command",
     "shape": "change it; then sensorgen pack trust {file}, sensorgen pack test {file}, and sensorgen check {name}",
     "printer": "replace its numbers; then sensorgen pack test {file}, and --printer {name} in any command",
@@ -48,13 +43,13 @@ class NewFile:
         return self.file, f"next: {self.next}"
 
 
-def new(what: What, name: str, pack: str = "") -> NewFile:
+def new(what: str, name: str, pack: str = "") -> NewFile:
     """Write a template.
 
     Parameters
     ----------
     what : str
-        One of ``KINDS``.
+        A kind of file, as of ``sensorgen new``.
     name : str
         Of the material, shape ...
     pack : str
@@ -67,7 +62,7 @@ def new(what: What, name: str, pack: str = "") -> NewFile:
     Unwritable
         The file cannot be written.
     """
-    kind = KINDS[what]
+    kind = _KINDS.get(what)
     _refuse_name(what, name, pack)
     home = packs.Pack(pack, "own", packs.place() / pack) if pack else packs.beside(Path())
     file = home.path(kind, name) if kind else home.folder / f"{name}.yaml"
@@ -78,9 +73,9 @@ def new(what: What, name: str, pack: str = "") -> NewFile:
     return NewFile(str(file), _NEXT[what].format(name=name, file=file))
 
 
-def _refuse_name(what: What, name: str, pack: str) -> None:
+def _refuse_name(what: str, name: str, pack: str) -> None:
     """Refuse what cannot be a name, and a name that ships."""
-    kind = KINDS[what]
+    kind = _KINDS.get(what)
     if not packs.is_name(kind or "shapes", name):
         example = {"shape": "block_tip"}.get(what, "lab-eel")
         raise BadInput(f"{name!r:.60} cannot be a {what}'s name; expected small letters and digits, as {example}")

@@ -16,7 +16,7 @@ from math import prod
 from typing import Annotated, Any, cast
 
 from sensorgen.checks.widths import TOUCH_MM
-from sensorgen.core.document import Column, Table
+from sensorgen.core.document import Column
 from sensorgen.core.errors import BadInput
 from sensorgen.design.arrays import ArrayLayout, Params, layout
 from sensorgen.design.design import Design, make
@@ -82,11 +82,6 @@ def tiles(design: Design) -> tuple[tuple[Tile, Design], ...]:
         f"{design.name} is {length:g} x {width:g} mm, the bed {bed_x:g} x {bed_y:g} mm; tiles in two columns are too "
         "large with their leads, too: expected less, or narrower leads (connector_mm, lead_mm)"
     )
-
-
-def table(placed: tuple[tuple[Tile, Design], ...]) -> Table:
-    """Places of tiles."""
-    return Table.of("tiles", "", tuple(tile for tile, _ in placed))
 
 
 def _fits(of: ArrayLayout, design: Design) -> bool:

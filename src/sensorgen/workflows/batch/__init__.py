@@ -207,12 +207,13 @@ def make(
         on_plate = _on_plate(placed.plan, placed.pieces, placed.plate)
         slicers = placed.plan.slicers if gcode else ()
         sliced_from = {"prusa"} & set(slicers)  # slicing leaves the 3MF that it took; CuraEngine takes none
-        families = [family for family in threemf.FAMILIES if family not in sliced_from]
-        for name, content in (*_threemfs(placed.plan.name, on_plate, families), *_files(placed, log_head)):
-            store.write(stage, {name: content})
-        sliced: dict[str, SlicedPlate] = {
-            s: _gcode(placed.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers
-        }
+        name = placed.plan.name
+        for family in threemf.FAMILIES:
+            if family not in sliced_from:
+                store.write(stage, {f"{name}.{family}.3mf": slicing.plate_3mf(on_plate, family, name)})
+        for file, content in _files(placed, log_head):
+            store.write(stage, {file: content})
+        sliced: dict[str, SlicedPlate] = {s: _gcode(name, on_plate, s, stage, time_limit_s, step) for s in slicers}
         step("record")
         batch = _record(placed, predicted, sliced, stage).sealed()
         store.write(stage, {record.RECORD: to_json(batch).encode()})
@@ -238,12 +239,6 @@ def _on_plate(plan: BatchPlan, pieces: Sequence[PrintPiece], plate: Plate) -> li
         )
         for number, place in plate.items()
     ]  # fmt: skip
-
-
-def _threemfs(name: str, plate: Sequence[Placed], families: Sequence[str]) -> Iterator[tuple[str, bytes]]:
-    """Name and content of the 3MF of a plate called ``name``, for some families of slicers."""
-    for family in families:
-        yield f"{name}.{family}.3mf", slicing.plate_3mf(plate, family, name)
 
 
 def _gcode(
@@ -327,7 +322,7 @@ def _files(placed: Arranged, log_head: str) -> Iterator[tuple[str, bytes]]:
     yield "plate.svg", layout.svg(plan.name, machine, placed.room, placed.plate, placed.pieces).encode()
     if plan.labels.sheet:
         places = enumerate(placed.plate, 1)
-        labels = [labelling.Label.of(placed.pieces[n], plan.name, order, log_head) for order, n in places]
+        labels = [labelling.Label(placed.pieces[n], plan.name, order, log_head) for order, n in places]
         yield "labels.html", labelling.page(labels, plan.name).encode()
 
 

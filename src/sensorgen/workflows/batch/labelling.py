@@ -32,32 +32,25 @@ class Label:
 
     Attributes
     ----------
-    name : str
-        The specimen's.
-    batch, design, design_id : str
-        Name of the batch, and name and hash of the design.
+    piece : PrintPiece
+        The specimen.
+    batch : str
+        Name of the batch.
     place : int
         Its number on the plate.
     log_head : str
         Identity of the last record of the log then, which anchors the predictions in it; "" without a log.
     """
 
-    name: str
+    piece: PrintPiece
     batch: str
-    design: str
-    design_id: str
     place: int
     log_head: str = ""
-
-    @classmethod
-    def of(cls, piece: PrintPiece, batch: str, place: int, log_head: str = "") -> "Label":
-        """The label of a specimen."""
-        return cls(piece.name, batch, piece.design.name, piece.design_id, place, log_head)
 
     @property
     def code(self) -> str:
         """Content of the QR code: the name first, then batch and design, a line each."""
-        return f"{self.name}\n{self.batch}\n{self.design_id}"
+        return f"{self.piece.name}\n{self.batch}\n{self.piece.design_id}"
 
 
 def page(labels: Iterable[Label], title: str) -> str:

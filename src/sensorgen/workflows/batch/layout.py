@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import prod
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.printer import Printer, Quality, tower
@@ -29,6 +30,11 @@ class Rect:
         """Middle [mm]."""
         return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
 
+    @property
+    def size_mm(self) -> Size:
+        """Length along x and width along y [mm]."""
+        return self.x1 - self.x0, self.y1 - self.y0
+
     def meets(self, other: "Rect") -> bool:
         """Test whether the two overlap; a shared edge is none."""
         return (
@@ -45,9 +51,13 @@ class Rect:
             and other.y1 <= self.y1 + _ROUNDING_MM
         )
 
-    def grown(self, left: float, front: float, right: float, back: float) -> "Rect":
-        """With its edges moved outwards [mm]."""
-        return Rect(self.x0 - left, self.y0 - front, self.x1 + right, self.y1 + back)
+    def grown(self, by_mm: float) -> "Rect":
+        """With all edges moved outwards [mm]."""
+        return Rect(self.x0 - by_mm, self.y0 - by_mm, self.x1 + by_mm, self.y1 + by_mm)
+
+    def longer(self, by_mm: float) -> "Rect":
+        """With its right and its back edge moved outwards [mm]."""
+        return Rect(self.x0, self.y0, self.x1 + by_mm, self.y1 + by_mm)
 
     def moved(self, x_mm: float, y_mm: float) -> "Rect":
         """Somewhere else."""
@@ -74,12 +84,18 @@ class Room:
 
     def free(self, place: Rect) -> bool:
         """Test whether a specimen may lie there, were it alone."""
-        around = place.grown(*[self.gap_mm] * 4)
+        around = place.grown(self.gap_mm)
         return self.area.holds(place) and not any(around.meets(k) for k in self.tower)
 
 
 Plate = dict[int, Rect]  # number in the list of sizes, to place
 Layouts = Callable[[Sequence[Size], Room], list[Plate]]
+
+
+def bed_of(printer: Printer) -> Rect:
+    """The bed of a printer."""
+    (x, y), (wide, deep) = printer.bed_centre_mm(), printer.bed_mm
+    return Rect(x - wide / 2, y - deep / 2, x + wide / 2, y + deep / 2)
 
 
 def room(printer: Printer, quality: Quality, tools: int, spacing_mm: float, brim_mm: float) -> Room:
@@ -94,11 +110,9 @@ def room(printer: Printer, quality: Quality, tools: int, spacing_mm: float, brim
     spacing_mm, brim_mm : float
         Between neighbours, and round each of them [mm].
     """
-    (x, y), (width, depth) = printer.bed_centre_mm(), printer.bed_mm
-    edge = EDGE_MM + brim_mm
-    area = Rect(x - width / 2 + edge, y - depth / 2 + edge, x + width / 2 - edge, y + depth / 2 - edge)
+    area = bed_of(printer).grown(-EDGE_MM - brim_mm)
     at = tower(printer, quality, tools)
-    around = Rect(at.x_mm, at.y_mm, at.x_mm + at.side_mm, at.y_mm + at.side_mm).grown(*[TOWER_BRIM_MM] * 4)
+    around = Rect(at.x_mm, at.y_mm, at.x_mm + at.side_mm, at.y_mm + at.side_mm).grown(TOWER_BRIM_MM)
     return Room(area, (around,) if tools > 1 else (), spacing_mm + 2 * brim_mm)
 
 
@@ -124,7 +138,7 @@ def packed(sizes: Sequence[Size], room: Room) -> list[Plate]:
     """
     _refuse_giants(sizes, room, middle=False)
     given = range(len(sizes))
-    largest = sorted(given, key=lambda i: (-sizes[i][0] * sizes[i][1], -sizes[i][0], i))
+    largest = sorted(given, key=lambda i: (-prod(sizes[i]), -sizes[i][0], i))
     plates = min((_packed(sizes, order, room) for order in (given, largest)), key=len)
     return [_centred(plate, room) for plate in plates]
 
@@ -141,28 +155,29 @@ def _packed(sizes: Sequence[Size], order: Sequence[int], room: Room) -> list[Pla
         y, x = min(_corners(frees[first], length, width))
         taken = Rect(x, y, x + length, y + width)
         frees[first] = _without(frees[first], taken)
-        plates[first][number] = taken.grown(0, 0, -room.gap_mm, -room.gap_mm)
+        plates[first][number] = taken.longer(-room.gap_mm)
     return plates
 
 
 def _all_free(room: Room) -> list[Rect]:
     """The empty plate; each specimen takes its gap along, to the right and the back."""
-    free = [room.area.grown(0, 0, room.gap_mm, room.gap_mm)]
+    free = [room.area.longer(room.gap_mm)]
     for taken in room.tower:
-        free = _without(free, taken.grown(0, 0, room.gap_mm, room.gap_mm))
+        free = _without(free, taken.longer(room.gap_mm))
     return free
 
 
 def _corners(free: Sequence[Rect], length: float, width: float) -> list[tuple[float, float]]:
     """Front left corners, y before x, of the free rectangles in which there is room."""
-    return [(r.y0, r.x0) for r in free if r.x1 - r.x0 >= length - _ROUNDING_MM and r.y1 - r.y0 >= width - _ROUNDING_MM]
+    least = length - _ROUNDING_MM, width - _ROUNDING_MM
+    return [(r.y0, r.x0) for r in free if r.size_mm[0] >= least[0] and r.size_mm[1] >= least[1]]
 
 
 def _without(free: Sequence[Rect], taken: Rect) -> list[Rect]:
     """The largest free rectangles after a place is taken; those inside others are left out."""
     pieces = sorted({p for r in free for p in _around(r, taken)}, key=lambda r: (r.y0, r.x0, r.y1, r.x1))
     largest: list[Rect] = []
-    for piece in sorted(pieces, key=lambda r: -(r.x1 - r.x0) * (r.y1 - r.y0)):
+    for piece in sorted(pieces, key=lambda r: -prod(r.size_mm)):
         if not any(k.holds(piece) for k in largest):
             largest.append(piece)
     return largest
@@ -178,7 +193,7 @@ def _around(r: Rect, taken: Rect) -> Iterator[Rect]:
         Rect(r.x0, r.y0, r.x1, taken.y0),
         Rect(r.x0, taken.y1, r.x1, r.y1),
     ):
-        if part.x1 - part.x0 > _ROUNDING_MM and part.y1 - part.y0 > _ROUNDING_MM:
+        if min(part.size_mm) > _ROUNDING_MM:
             yield part
 
 
@@ -254,7 +269,7 @@ def _refuse_giants(sizes: Sequence[Size], room: Room, *, middle: bool) -> None:
     free = _all_free(room)
     for length, width in dict.fromkeys(sizes):
         if not _corners(free, length + room.gap_mm, width + room.gap_mm):
-            x, y = max(room.area.x1 - room.area.x0, 0.0), max(room.area.y1 - room.area.y0, 0.0)
+            x, y = (max(side, 0.0) for side in room.area.size_mm)
             raise OutOfRange(
                 f"a specimen of {length:g} x {width:g} mm fits on no plate of this printer: {x:g} x {y:g} mm are free, "
                 "less the prime tower; make it smaller, or keep less room for a brim"
@@ -275,17 +290,11 @@ _STYLE = (
 )
 
 
-def bed_of(printer: Printer) -> Rect:
-    """The bed of a printer."""
-    (x, y), (wide, deep) = printer.bed_centre_mm(), printer.bed_mm
-    return Rect(x - wide / 2, y - deep / 2, x + wide / 2, y + deep / 2)
-
-
 def bed_svg(
     bed: Rect, heading: str, note: str, shapes: Iterable[str], listed: Sequence[str], notes: Sequence[str] = ()
 ) -> str:
     """A bed with shapes from its back left corner downwards, under a heading and a note, over a list and more notes."""
-    wide, deep = bed.x1 - bed.x0, bed.y1 - bed.y0
+    wide, deep = bed.size_mm
     columns = max(1, int(wide // _COLUMN_MM))
     rows = -(-len(listed) // columns)
     left, top, width, height = -6.0, -14.0, wide + 12, deep + 22 + (rows + len(notes)) * _ROW_MM
@@ -352,7 +361,7 @@ def _tower(tower: Rect, bed: Rect) -> str:
 def _specimens(plate: Plate, pieces: Sequence[PrintPiece], bed: Rect) -> Iterator[str]:
     fills = colours(pieces)
     for order, (number, place) in enumerate(plate.items(), 1):
-        length, width = place.x1 - place.x0, place.y1 - place.y0
+        length, width = place.size_mm
         size = min(5.0, 0.7 * width, 0.9 * length / _LETTER / len(f"{order}"))
         words = f"{order}: {pieces[number].name}"
         if len(words) * _LETTER * size > 0.95 * length:
@@ -366,4 +375,5 @@ def _specimens(plate: Plate, pieces: Sequence[PrintPiece], bed: Rect) -> Iterato
 
 
 def _rect(place: Rect, bed: Rect, **attributes: str) -> str:
-    return box("", place.x0 - bed.x0, bed.y1 - place.y1, place.x1 - place.x0, place.y1 - place.y0, **attributes)
+    length, width = place.size_mm
+    return box("", place.x0 - bed.x0, bed.y1 - place.y1, length, width, **attributes)

@@ -239,7 +239,7 @@ def specimens(pieces: Sequence[PrintPiece], plate: Plate) -> dict[str, PlateSpec
         (piece := pieces[number]).name: PlateSpecimen(
             order, piece.design.name, piece.design_id, piece.specimen.iteration, piece.specimen.replicate,
             (round(place.centre_mm[0], 6), round(place.centre_mm[1], 6)),
-            (round(place.x1 - place.x0, 6), round(place.y1 - place.y0, 6)),
+            (round(place.size_mm[0], 6), round(place.size_mm[1], 6)),
         )
         for order, (number, place) in enumerate(plate.items(), 1)
     }  # fmt: skip
