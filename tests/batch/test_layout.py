@@ -30,7 +30,7 @@ SIZES = st.lists(
 )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=120)
+@settings(deadline=None, max_examples=60)
 @given(
     SIZES, st.sampled_from(PRINTERS), st.integers(1, 5), st.sampled_from([0.0, 0.5, 5.0]), st.sampled_from([0.0, 3.0]),
     st.sampled_from([packed, column(1), column(5)]),

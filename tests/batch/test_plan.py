@@ -169,7 +169,7 @@ TREES = st.recursive(
 FITTING = {"iteration": 26, "designs": [{"shape": "tri", "replicates": 2}]}
 
 
-@settings(deadline=None, max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.dictionaries(KEYS, TREES, max_size=3), st.booleans())
 def test_any_mapping_is_a_plan_or_refused_in_words(tmp_path, data, whole):
     path = tmp_path / "plan.yaml"

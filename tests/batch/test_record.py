@@ -94,10 +94,6 @@ def test_made_again_it_is_the_same_to_the_byte(small, tmp_path, contents):
     assert contents(make(plan, tmp_path / "out", gcode=False).folder) == contents(small.folder)
 
 
-def test_verify_finds_nothing_where_nothing_changed(copy):
-    assert not differences(copy)
-
-
 def test_a_record_of_an_earlier_version_verifies(tmp_path):
     """Written by hand: version 0.1.0 had the prediction of a specimen in ``expected``."""
     (tmp_path / "plate.svg").write_text("<svg/>")
@@ -180,11 +176,15 @@ def test_verify_of_what_is_no_batch(tmp_path, content, said):
     assert said in str(error.value)
 
 
-def test_files_of_an_earlier_batch_that_are_no_longer_made_go_and_others_stay(plan, tmp_path):
-    path = plan()
-    folder = make(path, tmp_path / "out", gcode=False).folder
+def test_tabs_take_room_and_files_of_an_earlier_batch_go_and_others_stay(plan, tmp_path):
+    """Its labels have the head of the log, which proves what was in it before the print."""
+    path = plan("labels: {tab: true}\n" + plan().read_text("utf-8"))
+    folder = make(path, tmp_path / "out", gcode=False, log_head="0123456789abcdef" * 4).folder
+    assert folder.joinpath("labels.html").read_text("utf-8").count("<p>log 0123456789abcdef</p>") == 3
+    assert all(piece["size_mm"][0] > 30 for piece in read(folder)["specimens"].values())
+    assert not differences(folder)
     (folder / "mine.txt").write_text("mine")
-    path.write_text(path.read_text("utf-8") + "labels: {sheet: false}\n", "utf-8")
+    path.write_text(path.read_text("utf-8").replace("tab: true", "sheet: false"), "utf-8")
     make(path, tmp_path / "out", gcode=False)
     assert not (folder / "labels.html").exists()
     assert differences(folder) == Differences(extra=("mine.txt",))
@@ -215,15 +215,3 @@ def test_a_place_that_cannot_be_written_to(plan, tmp_path):
     (tmp_path / "out").write_text("a file")
     with pytest.raises(Unwritable, match="is a file; expected a folder"):
         make(plan(), tmp_path / "out", gcode=False)
-
-
-def test_tabs_are_bodies_of_their_own_and_take_room(plan, tmp_path):
-    with_tabs = make(plan("labels: {tab: true}\n" + plan().read_text("utf-8")), tmp_path / "out", gcode=False)
-    sizes = {tuple(s["size_mm"]) for s in read(with_tabs.folder)["specimens"].values()}
-    assert all(length > 30 for length, _ in sizes)
-
-
-def test_labels_have_the_head_of_the_log(plan, tmp_path):
-    """What was in the log before the print can be proven by a label on the specimen."""
-    folder = make(plan(), tmp_path / "out", gcode=False, log_head="0123456789abcdef" * 4).folder
-    assert folder.joinpath("labels.html").read_text("utf-8").count("<p>log 0123456789abcdef</p>") == 3

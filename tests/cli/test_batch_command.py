@@ -24,27 +24,23 @@ def plan(tmp_path):
 def test_a_batch_and_its_verification(run, plan):
     said = run("batch", "plan.yaml", "--no-gcode")
     assert said.code == 1, said.err  # the tips of its cogs are not printed, by the estimate
-    assert run("batch", "plan.yaml", "--no-gcode", "--force").code == 0
+    forced = run("batch", "plan.yaml", "--no-gcode", "--force", "--json")
+    record = json.loads(forced.out)
+    assert (forced.code, record["folder"], len(record["specimens"])) == (0, "out/plan", 2)
     assert "plan: 2 specimens on diabase-h5, fine" in said.out
     assert "26 triX .2mm 2 fine" in said.out
     assert "[ ] Clean the nozzles of T3, T4" in said.out
     assert max(map(len, said.out.splitlines())) <= 120
     said = run("batch", "verify", "out/plan")
     assert (said.code, said.out, said.err) == (0, "as recorded\n", "")
+    assert json.loads(run("batch", "verify", "out/plan", "--json").out) == {
+        "missing": [], "changed": [], "extra": [], "links": [], "record": [],
+    }  # fmt: skip
     Path("out/plan/plate.svg").write_text("other", encoding="utf-8")
     Path("out/plan/plan.yaml").unlink()
     said = run("batch", "verify", "out/plan")
     assert said.code == 1
     assert said.out.splitlines() == ["missing  plan.yaml", "changed  plate.svg", "differs from its record"]
-
-
-def test_json(run, plan):
-    said = run("batch", "plan.yaml", "--no-gcode", "--json")
-    record = json.loads(said.out)
-    assert (record["folder"], len(record["specimens"])) == ("out/plan", 2)
-    assert json.loads(run("batch", "verify", "out/plan", "--json").out) == {
-        "missing": [], "changed": [], "extra": [], "links": [], "record": [],
-    }  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -100,7 +100,9 @@ def test_python_dash_m(tmp_path):
 
 
 def test_list_materials_shows_every_value_with_its_source(run):
-    text = " ".join(run("list", "materials").out.split())
+    said = run("list", "materials")
+    assert max(map(len, said.out.splitlines())) <= 80
+    text = said.words
     for name in materials.names():
         material = materials.load(name)
         for group in (material.properties, material.print):

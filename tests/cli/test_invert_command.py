@@ -86,15 +86,10 @@ def test_predictions_come_back(run, tmp_path):
         assert float(row["position_mm"]) == pytest.approx(float(row["position_mm_given"]), abs=1e-5)
 
 
-def test_a_design_file(run, tmp_path):
-    (tmp_path / "m.csv").write_text(table())
-    (tmp_path / "d.yaml").write_text(json.dumps(PLAIN))
-    assert "4 ok" in run("invert", "d.yaml", "--perfect", "m.csv").out
-
-
 def test_json_and_the_terminal(run, tmp_path):
     (tmp_path / "m.csv").write_text(table())
-    said = run("invert", *DESIGN, "m.csv", "--json")
+    (tmp_path / "d.yaml").write_text(json.dumps(PLAIN))
+    said = run("invert", "d.yaml", "--perfect", "m.csv", "--json")
     told = json.loads(said.out.rpartition("\n--output")[0] or said.out)
     assert told["samples"] == 4
     assert told["statuses"] == {"ok": 4}
@@ -163,13 +158,6 @@ def test_an_older_answer_survives_an_error(run, tmp_path):
     (tmp_path / "bad.csv").write_text(table() + "1,x,2,3,4,5,6,7,8\n")
     assert run("invert", *DESIGN, "bad.csv", "-o", "o.csv").code == 2
     assert (tmp_path / "o.csv").read_text() == "mine"
-
-
-@pytest.mark.parametrize("words", [["--help"], ["tri", "--help"]])
-def test_help(run, words):
-    said = run("invert", *words)
-    assert said.code == 0
-    assert "MEASURED.csv" in said.out
 
 
 def test_in_real_time_readings_that_wait_are_dropped_and_counted(run, monkeypatch):

