@@ -22,7 +22,7 @@ import made  # noqa: E402 - the truth is made as for the tests
 
 from sensorgen.analysis.plots import recordings as plots  # noqa: E402
 from sensorgen.analysis.plots import static  # noqa: E402
-from sensorgen.measure.recording import joined, rig  # noqa: E402
+from sensorgen.measure.recording import rig  # noqa: E402
 from sensorgen.measure.signal import drift, lowpass, presses, waveform  # noqa: E402
 from sensorgen.measure.signal.run import of_presses, processed  # noqa: E402
 from sensorgen.models.sensor import Sensor  # noqa: E402
@@ -103,7 +103,7 @@ def joined_run(folder, plan, offset_s, skew, **how):
     run = made.run(plan, RATE, NOISE, **how)
     sio.savemat(folder / "run.mat", made.tree([run.impedance_ohm], [run.time_s], made.stamps(run.time_s)))
     log = rig(made.write_rig(folder / "rig.csv", made.rig_rows(plan, offset_s, skew, ramp_s=how.get("ramp_s", 0.2))))
-    return joined(made.read(folder / "run.mat"), log), run
+    return made.joined(made.read(folder / "run.mat"), log), run
 
 
 def filter_table():

@@ -28,7 +28,7 @@ def read(tmp_path):
             blocks = list(source.blocks(size))
         z = np.concatenate([b.impedance_ohm for b in blocks])
         rows = [row for b in blocks for row in b.rows]
-        return source.frequency_hz.tolist(), source.kept, z, [cells for b in blocks for cells in b.kept], rows
+        return source.frequency_hz.tolist(), source.kept, z, [cells for b in blocks for cells in b.text], rows
 
     return call
 
@@ -258,7 +258,7 @@ def test_of_readings_that_wait_the_newest_is_left_and_those_at_rest():
     (block,) = source.blocks()
     assert block.rows == [2, 5, 8]
     assert block.impedance_ohm[:, 0].real.tolist() == [100, 103, 106]
-    assert block.kept == [["0"], ["3"], ["6"]]
+    assert block.text == [["0"], ["3"], ["6"]]
     assert source.dropped == 4
     (whole,) = Readings(CsvTable("pipe", Waiting(io.BytesIO(text.encode()))), ("rest",)).blocks()
     assert len(whole.rows) == 7

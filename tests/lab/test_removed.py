@@ -9,6 +9,7 @@ from sensorgen.measure.lab import recorder, run
 from sensorgen.measure.lab.devices import SimulatedClock
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.bench import read_again
+from sensorgen.measure.recording import joined_all
 from sensorgen.measure.signal.run import processed
 
 
@@ -34,7 +35,8 @@ def run_and(remove, folder, at_s=12.5):
 def presses(log):
     (row,) = log.recordings()
     parts, rig = read_again(log, row)
-    return processed(next(parts)[0], rig).pairs
+    (beside,) = joined_all(next(parts), rig)
+    return processed(beside.recording, beside).pairs
 
 
 def remove_log(path):

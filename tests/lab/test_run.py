@@ -20,6 +20,7 @@ from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock
 from sensorgen.measure.lab.experiment import Choice
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.bench import read_again
+from sensorgen.measure.recording import joined_all
 from sensorgen.measure.signal.run import processed
 from sensorgen.measure.virtual.mechanics import VirtualRig
 
@@ -55,7 +56,8 @@ def test_the_recording_in_the_log_has_the_presses_that_were_asked_for(tmp_path):
     with Log(tmp_path / "log.db") as log:
         (row,) = log.recordings()
         parts, rig = read_again(log, row)
-        pairs = processed(next(parts)[0], rig).pairs
+        (beside,) = joined_all(next(parts), rig)
+        pairs = processed(beside.recording, beside).pairs
     assert row.specimen == "24 SX60"
     assert row.remark.startswith("simulated")
     assert row.source.startswith("simulated-")

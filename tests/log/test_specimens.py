@@ -183,7 +183,7 @@ def test_a_withdrawn_print_binds_no_more(log, own):
     logbook.withdraw(log, "print", 1, "wrong")
     assert log.bound("S1") is None
     with pytest.raises(BadInput, match="log specimen NAME"):
-        notes.specimen("S1", log)
+        notes.named("S1", log)
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,10 @@ from dataclasses import replace
 import made
 import numpy as np
 import pytest
+from made import joined
 
 from sensorgen.core.errors import BadInput, UnknownName
-from sensorgen.measure.recording import Recording, RecordingClock, RigLog, Source, joined
+from sensorgen.measure.recording import Recording, RecordingClock, RigLog, Source
 from sensorgen.measure.recording.samples import blank
 from sensorgen.measure.signal import drift, presses
 from sensorgen.measure.signal.presses import normalised, surface
@@ -242,7 +243,7 @@ def test_a_force_of_the_other_sign_or_off_its_zero_is_named_and_no_load_is_a_res
     one = Recording(RUN.time_s, made.TONES_HZ, RUN.impedance_ohm, blank(len(ALL)), RecordingClock(), source)
     time, told, position, force = made.rig_rows(MADE)
     log = RigLog(time - made.EPOCH_S, told, position, sign * force + zero_n, np.zeros(len(time), bool))
-    worked = processed(one, log)
+    worked = processed(one, joined(one, log))
     assert worked.pairs is None
     assert said in worked.notes[-1]
     z = worked.rest_ohm()
@@ -271,10 +272,11 @@ def slow_loads(period_s, count, power, lens, noise_n=0.001):
 
 def test_hysteresis_is_no_late_clock_and_its_error_has_that_of_the_clock():
     one, log = slow_loads(40, 4, power=1, lens=0.2)
-    clocks = joined(one, log).clocks
+    beside = joined(one, log)
+    clocks = beside.clocks
     assert clocks.offset_s == pytest.approx(2, abs=4 * clocks.offset_error_s)
     assert clocks.offset_error_s < 0.01
-    worked = processed(one, log, law="line")
+    worked = processed(one, beside, law="line")
     ways = of_presses(worked).ways.values()
     assert len(ways) == 4
     for way in ways:  # over the span from 0.2 N on
@@ -286,8 +288,9 @@ def test_hysteresis_is_no_late_clock_and_its_error_has_that_of_the_clock():
 @pytest.mark.parametrize(("lens", "noise_n"), [(0.0, 0.001), (0.1, 0.001), (0.0, 0.03)])
 def test_equal_loads_of_a_film_that_is_steep_at_first_tell_its_hysteresis(lens, noise_n):
     one, log = slow_loads(29, 8, 0.75, lens, noise_n)  # as like itself half a period late as in time
-    assert joined(one, log).clocks.offset_s == pytest.approx(2, abs=0.04)  # a row of the rig
-    for way in of_presses(processed(one, log, law="line")).ways.values():
+    beside = joined(one, log)
+    assert beside.clocks.offset_s == pytest.approx(2, abs=0.04)  # a row of the rig
+    for way in of_presses(processed(one, beside, law="line")).ways.values():
         assert way.share[1] == pytest.approx(lens / (1 - (0.2 / 6) ** 0.75), abs=0.015)
 
 

@@ -9,14 +9,14 @@ from scipy import stats
 
 from sensorgen.core.document import comma_separated
 from sensorgen.core.errors import OutOfRange
-from sensorgen.measure.signal.presses import RunPlan, schedule
+from sensorgen.measure.signal.presses import RunPlan
 
 PLAN = RunPlan(7, 400, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0, repeats=1)
 
 
 def table(plan):
     """The plan as CSV."""
-    return comma_separated(next(schedule(plan, "tri").document()))
+    return comma_separated(next(plan.document()))
 
 
 def test_the_same_seed_is_the_same_plan_and_another_is_another():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import scipy.io as sio
 
-from sensorgen.measure.recording import joined, rig
+from sensorgen.measure.recording import rig
 from sensorgen.measure.signal import drift, presses
 from sensorgen.measure.signal.presses import GUARD_S, WINDOW_S
 from sensorgen.prediction.identifiability.fisher import bounds, slopes
@@ -25,7 +25,7 @@ def run(tmp_path_factory):
     sio.savemat(folder / "run.mat", made.tree([z], [truth.time_s], made.stamps(truth.time_s, skew=6e-5)))
     rows = made.rig_rows(MADE, offset_s=7.25, skew=-1.5e-4)
     log = rig(made.write_rig(folder / "rig.csv", rows, errors={1000: "timeout"}))
-    return joined(made.read(folder / "run.mat"), log)
+    return made.joined(made.read(folder / "run.mat"), log)
 
 
 @pytest.fixture(scope="module")

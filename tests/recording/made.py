@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from sensorgen.measure.recording import parts
+from sensorgen.measure.recording import Recording, Source, joined_all, parts
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
 
@@ -24,6 +24,16 @@ def read(path, columns=None):
     """Recording of the one lock-in in a file of one part."""
     (recording,) = read_all(path, columns)
     return recording
+
+
+def rebuilt(count, time_s, stamp_s):
+    """A recording of ones with the rebuilt clock."""
+    return Recording.rebuilt(np.ones((count, 1), complex), TONES_HZ[:1], time_s, stamp_s, Source("", ""))
+
+
+def joined(recording, log):
+    """One recording with the rig's log."""
+    return joined_all((recording,), log)[0]
 
 
 def sensor():

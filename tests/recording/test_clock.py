@@ -3,9 +3,9 @@
 import made
 import numpy as np
 import pytest
+from made import rebuilt
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording.samples import rebuilt
 
 TIME = np.arange(140 * 60) / 140
 
@@ -43,7 +43,7 @@ def test_lost_samples_move_the_time_and_a_set_clock_does_not():
     back = rebuilt(len(TIME), TIME, stamps - np.where(TIME >= 10, 3600, 0))
     np.testing.assert_array_equal(back.time_s, TIME)
     assert not back.marks["gap"].any()
-    assert "set back by 3.6e+03 s" in back.notes[0]
+    assert "set back by 3.6e+03 s" in back.source.notes[0]
     assert back.clock.epoch_s == pytest.approx(made.EPOCH_S + 0.03, abs=0.02)
 
 
@@ -73,7 +73,7 @@ def test_a_time_that_does_not_rise_is_rebuilt_from_the_index():
     broken[200] = broken[199]
     found = rebuilt(len(TIME), broken, None)
     np.testing.assert_allclose(found.time_s, TIME, atol=1e-9)
-    assert found.notes == ("the time of 11 samples does not rise: placed between their neighbours",)
+    assert found.source.notes == ("the time of 11 samples does not rise: placed between their neighbours",)
     with pytest.raises(BadInput, match="no sampling times"):
         rebuilt(5, None, None)
     with pytest.raises(BadInput, match="does not rise"):

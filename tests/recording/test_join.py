@@ -5,12 +5,13 @@ from dataclasses import replace
 import made
 import numpy as np
 import pytest
+from made import joined, rebuilt
 from scipy.signal import lfilter
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording import Recording, RecordingClock, Source, joined, joined_all, rig
+from sensorgen.measure.recording import Recording, RecordingClock, Source, joined_all, rig
 from sensorgen.measure.recording.rig import _covariance
-from sensorgen.measure.recording.samples import blank, rebuilt, sifted
+from sensorgen.measure.recording.samples import blank, sifted
 
 MADE = made.presses(12)
 
@@ -144,9 +145,9 @@ def test_clocks_that_both_count_from_0_and_clocks_far_apart(tmp_path, run):
     assert "assumed to agree" in joined(recording(dead, stamped=False), same).clocks.words()  # both count from 0
     with pytest.raises(BadInput, match=r"clocks, which have 0 s in common \(recording from 1\.66142e\+09 s, rig's log"):
         joined(recording(dead), same)  # stamps since 1970, beside a rig that counts from 0
-    far = rig(made.write_rig(tmp_path / "far.csv", made.rig_rows(MADE, 9000.0)))
+    far = stamped(made.write_rig(tmp_path / "far.csv", made.rig_rows(MADE, 9000.0)))
     with pytest.raises(BadInput, match="do not overlap within 1 s"):
-        joined(recording(run), far, within_s=1.0)
+        joined(recording(run), far)
 
 
 def test_a_rigs_log_in_other_words(tmp_path):

@@ -174,7 +174,7 @@ def _plan(
         Draw the plan.
     """
     from sensorgen.core import files
-    from sensorgen.measure.signal.presses import RunPlan, schedule
+    from sensorgen.measure.signal.presses import RunPlan
 
     if len(force_n) != 2:
         raise BadInput(f"--force: {len(force_n)} values; expected the least and the largest, as in 0,6N")
@@ -184,11 +184,11 @@ def _plan(
     if tip_mm > length:
         raise OutOfRange(f"--tip {tip_mm:g} mm is longer than the sensor, {length:g} mm; expected a shorter one")
     where = (tip_mm / 2, length - tip_mm / 2)
-    plan = schedule(RunPlan(seed, presses, (force_n[0], force_n[1]), where, dwell_s, rest_s, repeats), design.name)
+    plan = RunPlan(seed, presses, (force_n[0], force_n[1]), where, dwell_s, rest_s, repeats, design.name)
     if picture:
         from sensorgen.analysis.plots import recordings, static
 
-        files.replace(picture, static.png(recordings.schedule(list(plan.steps), plan.seconds)))
+        files.replace(picture, static.png(recordings.schedule(plan.steps(), plan.seconds())))
     table = "".join(render.pieces(plan, "csv"))
     if output:
         files.replace(output, table.encode())

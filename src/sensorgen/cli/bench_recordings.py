@@ -359,6 +359,6 @@ def _live(measured: str, *, rate_hz: Rate, cutoff_hz: Cutoff = None) -> None:
         render.say(head, nl=False)
         for block in source.blocks():
             sifted(block.impedance_ohm)
-            for beside, row in zip(block.kept, smooth(block.impedance_ohm).tolist(), strict=True):
+            for beside, row in zip(block.text, smooth(block.impedance_ohm).tolist(), strict=True):
                 parts = (f"{part:.12g}" if isfinite(z.real) else "" for z in row for part in (z.real, z.imag))
                 render.say(csv_row([*beside, *parts]), nl=False)

@@ -86,7 +86,7 @@ class _ByRatio:
         self._doubted = doubt_rest(presses, at_rest, self._doubted)
         self.summary.add(presses, at_rest)
         times = [[repr(t) if np.isfinite(t) else ""] if _TIME in self.source.numbers else [] for t in time_s.tolist()]
-        return answers.rows([[*a, *b] for a, b in zip(times, block.kept, strict=True)], presses, at_rest)
+        return answers.rows([[*a, *b] for a, b in zip(times, block.text, strict=True)], presses, at_rest)
 
     def _renew(self) -> None:
         """Make the inverter, and once more when readings at rest tell their noise."""
@@ -137,7 +137,7 @@ class _Perfect:
         presses = self.estimator.batch(block.impedance_ohm[under_load])
         self.summary.add(presses)
         prior = self.estimator.prior is not None
-        return answers.rows([block.kept[k] for k in under_load], presses, prior=prior)
+        return answers.rows([block.text[k] for k in under_load], presses, prior=prior)
 
     def result(self) -> "Documented":
         return self.summary.result()

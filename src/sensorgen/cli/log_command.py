@@ -261,7 +261,7 @@ def _bind(file: LogFile, specimen: str, design: str) -> None:
             for bound in prints.bind(log, [specimen], design):
                 render.say(f"{specimen}: design {getattr(bound, 'design', '')}", err=bool(render.form()))
     with nullcontext() if file.file and not file.file.exists() else file.existing() as known:
-        notes.specimen(specimen, known)
+        notes.named(specimen, known)
 
 
 def _log_reading(
@@ -487,7 +487,7 @@ def _entries(log: "Log", what: str) -> "list[Entry]":
     if what.isascii() and what.isdigit():
         entries += log.entries(Reading, superseded=True, number=int(what))
     else:
-        name = notes.specimen(what, log).specimen
+        name = notes.named(what, log).specimen.specimen
         rows: list[Print | Reading | BenchRun] = [*log.entries(Print, specimen=name)]
         rows += log.entries(Reading, superseded=True, specimen=name)
         rows += log.entries(BenchRun, superseded=True, specimen=name)

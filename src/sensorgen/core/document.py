@@ -302,13 +302,10 @@ def _html(part: Part) -> str:
     table, caption, count = replace(part, cells=tuple(part.cells[:MOST_ROWS])).filled(), part.caption, len(part.cells)
     if count > MOST_ROWS:
         caption += f" (the first {MOST_ROWS} of {count} rows; CSV has all)"
-    return _scrolled(_html_list(table) if count == 1 else _html_rows(table), caption, part.key)
-
-
-def _html_list(table: Table) -> Iterator[str]:
-    """A table of one row, a line for each column."""
-    for column, cell in zip(table.columns, table.cells[0], strict=True):
-        yield _row(_html_head(column, "row"), _html_cell(column, cell))
+    if count == 1:  # a line for each column
+        pairs = zip(table.columns, table.cells[0], strict=True)
+        return _scrolled((_row(_html_head(c, "row"), _html_cell(c, cell)) for c, cell in pairs), caption, part.key)
+    return _scrolled(_html_rows(table), caption, part.key)
 
 
 def _html_rows(table: Table) -> Iterator[str]:

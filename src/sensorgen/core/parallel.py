@@ -87,7 +87,7 @@ def _in_lanes(
 
     queue, free, ready = _Queue(len(inputs), len(lanes), lanes[0].shared), list(lanes), list[tuple[int, Result]]()
     running: dict[Future[tuple[float, list[Result]]], tuple[Lane, _Chunk]] = {}
-    while queue.left() or running:
+    while queue.todo or queue.again or running:
         while free and (chunk := queue.next(waits=bool(running))):
             lane = free.pop()
             running[lane.submit(work, [inputs[k] for k in chunk.numbers])] = lane, chunk
@@ -116,10 +116,6 @@ class _Queue:
         self.todo, self.again = deque(range(count)), deque[_Chunk]()
         self.lanes, self.shared, self.spent_s, self.done = lanes, shared, 0.0, 0
 
-    def left(self) -> bool:
-        """Test whether there are any."""
-        return bool(self.todo or self.again)
-
     def next(self, *, waits: bool) -> "_Chunk | None":
         """The next chunk, so small that each lane gets two more; None where one that killed ``waits`` for others."""
         if self.again and not (self.shared and (self.todo or waits)):
@@ -129,10 +125,18 @@ class _Queue:
         return _Chunk(tuple(self.todo.popleft() for _ in range(size))) if size else None
 
     def died(self, chunk: "_Chunk", lost: Lost[Result] | None) -> list[tuple[int, Result]]:
-        """Send a chunk again after a death; number and result of a work that is not, an error where it has none."""
-        again = chunk.after_death()
-        self.again.extend(again)
-        if again:
+        """Send a chunk again after a death, after a second one its works one by one.
+
+        Returns
+        -------
+        list of (int, result)
+            Of a work that died alone; an error where none is made of it.
+        """
+        if not chunk.died:
+            self.again.append(_Chunk(chunk.numbers, died=True))
+            return []
+        if len(chunk.numbers) > 1:
+            self.again.extend(_Chunk((k,), died=True) for k in chunk.numbers)
             return []
         if lost is None:
             raise SensorgenError(_DIED) from None
@@ -191,16 +195,10 @@ def _apart(work: Work[Result], *given: Any) -> tuple[Result, list[tuple[Any, Any
 
 @dataclass(frozen=True)
 class _Chunk:
-    """Numbers of works that are sent together, and how many processes they have killed."""
+    """Numbers of works that are sent together; ``died`` where their process did before."""
 
     numbers: tuple[int, ...]
-    deaths: int = 0
-
-    def after_death(self) -> "list[_Chunk]":
-        """Chunks to send after another death: this one again, its works one by one, or nothing."""
-        if not self.deaths:
-            return [_Chunk(self.numbers, 1)]
-        return [_Chunk((k,), 1) for k in self.numbers] if len(self.numbers) > 1 else []
+    died: bool = False
 
 
 def _chunk(work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> tuple[float, list[Result]]:

@@ -37,27 +37,18 @@ def text(path: Path) -> str:
     BadInput
         Unreadable, no regular file, over ``MAX_BYTES``, or not UTF-8.
     """
-    try:
-        return _content(path).decode("utf-8-sig")
+    try:  # a pipe or device, which may never end, is not waited for
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))) as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise BadInput(f"{path}: not a file; expected a YAML file")
+            if status.st_size > MAX_BYTES:
+                raise BadInput(f"{path}: {status.st_size} bytes; expected at most {MAX_BYTES}: is this the right file?")
+            return file.read(MAX_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise BadInput(f"{path}: not UTF-8 at byte {error.start}: save it as UTF-8 text") from None
     except (OSError, ValueError) as error:
         raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
-
-
-def _content(path: Path) -> bytes:
-    """Content of a regular file; a pipe or device, which may never end, is not waited for."""
-    with open(path, "rb", opener=_unblocked) as file:
-        status = os.fstat(file.fileno())
-        if not stat.S_ISREG(status.st_mode):
-            raise BadInput(f"{path}: not a file; expected a YAML file")
-        if status.st_size > MAX_BYTES:
-            raise BadInput(f"{path}: {status.st_size} bytes; expected at most {MAX_BYTES}: is this the right file?")
-        return file.read(MAX_BYTES)
-
-
-def _unblocked(path: str, flags: int) -> int:
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def parse(text: str, where: str) -> dict[str, Any]:

@@ -102,7 +102,7 @@ def read(path: Path) -> LcrTable:
         No such header, no frequency, no quantity, an unknown unit, or a cell that is no number; with file and row.
     """
     lines = _lines(path)
-    header = _found(lines, path)
+    header = _header(lines, path)
     columns, first_row = _with_units(lines, header)
     rows, faulty = list[_Row](), 0
     for number, cells in _rows(lines, header, first_row, path):
@@ -128,17 +128,6 @@ def _doubts(columns: Sequence[_Column], overloads: int, faulty: int) -> tuple[st
     return tuple(doubts)
 
 
-def _found(lines: Sequence[str], path: Path) -> _Header:
-    """Header with a frequency."""
-    header = _header(lines)
-    if header is None:
-        first = next((line.strip() for line in lines if line.strip()), "")
-        raise BadInput(f"{path}: no table of an LCR meter, begins with {first!r:.60}; expected {EXPECTED}")
-    if not any(column.quantity == "frequency" for column in header.columns):
-        raise BadInput(f"{path}, row {header.line + 1}: no column of the frequency among {', '.join(header.heads)}")
-    return header
-
-
 def _rows(lines: Sequence[str], header: _Header, first: int, path: Path) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of each row of the table."""
     for number in range(first, len(lines)):
@@ -153,7 +142,7 @@ def _rows(lines: Sequence[str], header: _Header, first: int, path: Path) -> Iter
 def looks_like(path: Path) -> bool:
     """Test whether a file has the header of an LCR meter's export."""
     try:
-        return bool(_found(_lines(path, _HEAD_BYTES), path))
+        return bool(_header(_lines(path, _HEAD_BYTES), path))
     except BadInput:
         return False
 
@@ -181,16 +170,20 @@ def _cells(line: str, separator: str) -> list[str]:
     return cells
 
 
-def _header(lines: Sequence[str]) -> _Header | None:
-    """The first line with names of two quantities, the frequency being one of them, or two others."""
+def _header(lines: Sequence[str], path: Path) -> _Header:
+    """The first line with names of two quantities, of which one has to be the frequency."""
     for number, line in enumerate(lines[:_HEADER_LINES]):
         bare = line.strip().lstrip("#!%*").strip()  # some write the header as a comment
         separator = max(";\t,", key=bare.count)
         heads = _cells(bare, separator) if separator in bare else []
         columns = tuple(_columns(heads, lines[:number]))
-        if len(columns) > 1 and len({column.quantity for column in columns}) == len(columns):
+        quantities = {column.quantity for column in columns}
+        if len(quantities) == len(columns) > 1:
+            if "frequency" not in quantities:
+                raise BadInput(f"{path}, row {number + 1}: no column of the frequency among {', '.join(heads)}")
             return _Header(number, separator, columns, tuple(heads))
-    return None
+    first = next((line.strip() for line in lines if line.strip()), "")
+    raise BadInput(f"{path}: no table of an LCR meter, begins with {first!r:.60}; expected {EXPECTED}")
 
 
 def _columns(heads: Sequence[str], before: Sequence[str]) -> Iterator[_Column]:

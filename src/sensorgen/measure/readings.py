@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput, within
 from sensorgen.measure import csv_table, lcr
-from sensorgen.measure.csv_table import BLOCK_ROWS, SAME_NAMES, CsvTable, listed
+from sensorgen.measure.csv_table import BLOCK_ROWS, SAME_NAMES, CsvTable, TableRows, listed
 from sensorgen.measure.immittance import impedance, pair
 
 _IMPEDANCE = re.compile(r"(re|im)_ohm_(.*)", re.IGNORECASE)
@@ -25,25 +25,16 @@ _EXPECTED = "expected two columns per frequency, as re_ohm_1.1kHz and im_ohm_1.1
 
 
 @dataclass(frozen=True)
-class FileRows:
-    """Consecutive rows of a file.
+class FileRows(TableRows):
+    """Consecutive rows of a file: numbers of ``Readings.numbers``, text of ``Readings.kept``.
 
     Attributes
     ----------
-    rows : list of int
-        Row numbers in the file.
     impedance_ohm : (n, m) array
         Readings at m frequencies [ohm]; nan where a cell is empty or says so.
-    kept : list of list of str
-        Cells of the columns in ``Readings.kept``, row by row.
-    numbers : (n, k) array
-        Columns in ``Readings.numbers``; nan where a cell is empty.
     """
 
-    rows: list[int]
     impedance_ohm: NDArray[np.complex128]
-    kept: list[list[str]]
-    numbers: NDArray[np.float64]
 
 
 class Readings:
@@ -94,7 +85,7 @@ class Readings:
         for block in self._table.blocks(columns, self._others, size):
             impedance = np.empty((len(block.rows), m), np.complex128)
             impedance.real, impedance.imag = block.numbers[:, :m], block.numbers[:, m : 2 * m]
-            rows = FileRows(block.rows, impedance, block.text, block.numbers[:, 2 * m :])
+            rows = FileRows(block.rows, block.numbers[:, 2 * m :], block.text, impedance)
             yield self._only_newest(rows) if self._newest else rows
 
     def _only_newest(self, block: FileRows) -> FileRows:
@@ -103,8 +94,8 @@ class Readings:
         stays[np.flatnonzero(~stays)[-1:]] = True
         self.dropped += int(np.count_nonzero(~stays))
         rows = np.flatnonzero(stays).tolist()
-        text = [block.kept[k] for k in rows]
-        return FileRows([block.rows[k] for k in rows], block.impedance_ohm[rows], text, block.numbers[rows])
+        text = [block.text[k] for k in rows]
+        return FileRows([block.rows[k] for k in rows], block.numbers[rows], text, block.impedance_ohm[rows])
 
 
 class LcrReadings(Readings):
@@ -148,7 +139,7 @@ class LcrReadings(Readings):
             some = self._sweeps[start : start + size]
             z = [[impedance(sweep.get(f, {}), f) or np.nan for f in self.frequency_hz.tolist()] for sweep in some]
             rows = list(range(start + 1, start + len(some) + 1))
-            yield FileRows(rows, np.array(z, np.complex128), [[]] * len(some), np.empty((len(some), 0)))
+            yield FileRows(rows, np.empty((len(some), 0)), [[]] * len(some), np.array(z, np.complex128))
 
 
 @contextmanager

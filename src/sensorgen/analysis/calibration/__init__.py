@@ -94,7 +94,7 @@ def design_of(log: Log, specimen: str) -> tuple[str, Design]:
     name = bound.specimen if bound else specimen
     if bound is None:
         with suppress(BadInput):
-            name = notes.specimen(specimen).specimen
+            name = notes.named(specimen).specimen.specimen
     design = prints.designs(log).get(bound.design_id) if bound else None
     if design is None:
         with suppress(BadInput):

@@ -133,7 +133,7 @@ def planned(experiment: Experiment, log: Log | None = None) -> PlannedRun:
         What :func:`sensorgen.measure.lab.experiment.check` refuses; a specimen whose name the log does not take.
     """
     with within("specimen"):
-        notes.specimen(experiment.specimen, log)
+        notes.named(experiment.specimen, log)
     design = None if experiment.length_mm else design_of(experiment, log)
     length = experiment.length_mm or (float(design.params.length_mm) if design else USUAL_MM)
     experiments.check(experiment, length, 0.0)  # its places, before presses are made of them
@@ -152,8 +152,7 @@ def design_of(experiment: Experiment, log: Log | None) -> Design | None:
         named = experiment.virtual.design
         with within("virtual.design"):
             return load(Path(named)) if Path(named).suffix else make({"shape": named})
-    design_id, _ = notes.design_fields(experiment.specimen, log)
-    logged = prints.designs(log).get(design_id) if log else None
+    logged = prints.designs(log).get(notes.named(experiment.specimen, log).design_id) if log else None
     try:
         return logged or notes.design_of(experiment.specimen)
     except BadInput:

@@ -259,7 +259,7 @@ def log_recording(
     from sensorgen.measure.log import notes
     from sensorgen.measure.recording.spool import MOST_BYTES
 
-    of, (design_id, design) = notes.specimen(specimen, log), notes.design_fields(specimen, log)
+    of = notes.named(specimen, log)
     paths = [recording, *([rig] if rig else [])]
     for path in paths:  # before their SHA-256 is computed
         checked_head(path, MOST_BYTES, "a recording")
@@ -270,12 +270,12 @@ def log_recording(
     if raw_files != before:
         raise BadInput(f"{str(recording)!r} {files.CHANGED}")
     uids = [file.uid for file in raw_files]
-    identity = " ".join(filter(None, (of.specimen, *uids, supersedes)))
+    identity = " ".join(filter(None, (of.specimen.specimen, *uids, supersedes)))
     file, rig_file = (*uids, "")[:2]
     run = BenchRun(
-        **vars(of), uid=sha256(identity.encode()).hexdigest()[:32], written=specimen, design_id=design_id,
-        design=design, source=recording.name, remark=remark, supersedes=supersedes, file=file, rig_file=rig_file,
-        facts=to_json(summary),
+        **vars(of.specimen), uid=sha256(identity.encode()).hexdigest()[:32], written=specimen,
+        design_id=of.design_id, design=of.design, source=recording.name, remark=remark, supersedes=supersedes,
+        file=file, rig_file=rig_file, facts=to_json(summary),
     )  # fmt: skip
     return [row for row in log.add([*raw_files, run]) if isinstance(row, BenchRun)]
 

@@ -21,11 +21,6 @@ _SHA256 = re.compile(r"[0-9a-f]{64}")
 _SUFFIX = re.compile(r"\.[A-Za-z0-9]{1,8}")
 
 
-def folder(log: Path) -> Path:
-    """Folder of the raw files of a log."""
-    return log.with_name(f"{log.name}.files")
-
-
 def place(folder: Path, file: RawFile) -> Path:
     """Path of a raw file: its SHA-256 with the suffix of its original name."""
     if not _SHA256.fullmatch(file.uid):

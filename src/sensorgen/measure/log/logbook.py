@@ -111,7 +111,7 @@ class Log(AbstractContextManager["Log", None]):
     @property
     def files(self) -> Path:
         """Folder of raw files, beside the log."""
-        return files.folder(self.path)
+        return self.path.with_name(f"{self.path.name}.files")
 
     def raw(self, sha256: str) -> Path:
         """Path of the raw file with that SHA-256.

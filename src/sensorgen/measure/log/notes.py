@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from functools import lru_cache
 from itertools import chain
+from typing import NamedTuple
 
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.core.records import shown
@@ -17,7 +18,7 @@ from sensorgen.design import specimen_name
 from sensorgen.design.design import Design
 from sensorgen.measure import immittance
 from sensorgen.measure.immittance import NO_VALUE, NUMBER, decimal
-from sensorgen.measure.log.entries import SPECIMEN_COLUMNS, Print, Reading, Specimen
+from sensorgen.measure.log.entries import SPECIMEN_COLUMNS, Reading, Specimen
 from sensorgen.measure.log.logbook import Log
 
 OVERLOAD = math.inf  # beyond the meter's range [ohm]
@@ -145,7 +146,26 @@ FIRST_WITH_FILMS = 22  # iteration from which on the thesis writes films into na
 _UNBAKED = re.compile(r"\b(not|un|never)[\s-]*baked\b|\bbefore (the )?bak(e|ing)\b", re.IGNORECASE)
 
 
-def specimen(written: str, log: Log | None = None) -> Specimen:
+class Named(NamedTuple):
+    """A specimen by its name.
+
+    Attributes
+    ----------
+    specimen : Specimen
+        The specimen.
+    design_id, design : str
+        Identity and name of the design that the name is bound to or stands for; "" where there is none.
+    doubts : tuple of str
+        Assumptions about a name that is bound to no design.
+    """
+
+    specimen: Specimen
+    design_id: str
+    design: str
+    doubts: tuple[str, ...] = ()
+
+
+def named(written: str, log: Log | None = None) -> Named:
     """Specimen by its name.
 
     Parameters
@@ -160,11 +180,12 @@ def specimen(written: str, log: Log | None = None) -> Specimen:
     BadInput
         The name is bound to two designs; or to none, and it cannot be parsed.
     """
-    bound = _bound(written, log)
+    bound = log.bound(" ".join(written.split())) if log else None
     if bound:
-        return Specimen(**{key: getattr(bound, key) for key in SPECIMEN_COLUMNS})
+        of = Specimen(**{key: getattr(bound, key) for key in SPECIMEN_COLUMNS})
+        return Named(of, bound.design_id, bound.design)
     try:
-        return _by_name(written)[0]
+        return _by_name(written)
     except BadInput as error:
         raise BadInput(f"{error}; or bind it to its design: sensorgen log specimen NAME --design FILE") from None
 
@@ -173,11 +194,7 @@ def asked(log: Log, iteration: int | None, written: Sequence[str]) -> tuple[str,
     """Specimens of a question, each once; BadInput where it names an iteration beside them."""
     if written and iteration is not None:
         raise BadInput(f"iteration {iteration} beside specimens; expected one of the two")
-    return tuple(dict.fromkeys(specimen(name, log).specimen for name in written))
-
-
-def _bound(written: str, log: Log | None) -> Print | None:
-    return log.bound(" ".join(written.split())) if log else None
+    return tuple(dict.fromkeys(named(name, log).specimen.specimen for name in written))
 
 
 def reading(
@@ -207,7 +224,7 @@ def reading(
     mega : bool
         Whether a small m is known to mean mega, so that it raises no doubt.
     log : Log, optional
-        As of :func:`specimen`.
+        As of :func:`named`.
 
     Raises
     ------
@@ -224,16 +241,16 @@ def reading(
         raise BadInput(f"a remark of {len(remark)} characters; expected at most {MAX_REMARK}")
     if "\0" in "".join((remark, written, y_words, z_words)):
         raise BadInput("a zero byte in a name, a value or a remark; expected text")
-    of, (design_id, design) = specimen(written, log), design_fields(written, log)
+    of = named(written, log)
     y, z = resistance("y", y_words, mega=mega), resistance("z", z_words, mega=mega)
-    doubts = [] if _bound(written, log) else _assumed(written, of)
+    doubts = [*of.doubts]
     doubts += [f"{axis}: {doubt}" for axis, parsed in (("y", y), ("z", z)) for doubt in parsed.doubts]
     doubts += [*_blanks(y, z), *_points(separator, f"{y_words}/{z_words}")] if separator else []
     if _UNBAKED.search(remark):
         doubts += ["baked, but the remark says that it is not"] if baked else []
         baked = bool(baked)
     return Reading(
-        **vars(of), uid=uid or uuid.uuid4().hex, design_id=design_id, design=design, written=written,
+        **vars(of.specimen), uid=uid or uuid.uuid4().hex, design_id=of.design_id, design=of.design, written=written,
         y_words=y_words, z_words=z_words, y_ohm=y.ohm, z_ohm=z.ohm, remark=remark, doubts=tuple(doubts),
         baked=baked, measured_at=measured_at, instrument=instrument,
         source=source, source_row=source_row, supersedes=supersedes,
@@ -251,12 +268,6 @@ def _points(separator: str, words: str) -> list[str]:
     """Doubts about numbers such as 1.300 in a table with decimal commas."""
     numbers = _POINTS.findall(words) if separator == ";" else []
     return [f"{n}: point read as the decimal one; thousands would be {n.replace('.', '')} ohm" for n in numbers]
-
-
-def _assumed(written: str, of: Specimen) -> list[str]:
-    """Doubts about a name that is bound to no design; one without a film is usual in early iterations only."""
-    film_expected = (of.iteration or 0) < FIRST_WITH_FILMS
-    return [doubt for doubt in _by_name(written)[2] if doubt != specimen_name.NO_FILM or film_expected]
 
 
 def with_ac(of: Reading, typed: Mapping[str, Sequence[str]]) -> Reading:
@@ -326,37 +337,29 @@ def resistance(axis: str, text: str, *, mega: bool = False) -> Resistances:
         raise error.within(f"resistance in {axis.upper()}") from None
 
 
-def design_fields(written: str, log: Log | None = None) -> tuple[str, str]:
-    """Identity and name of the design that a specimen's name is bound to or stands for; "" where there is none."""
-    bound = _bound(written, log)
-    if bound:
-        return bound.design_id, bound.design
-    return _by_name(written)[1]
-
-
 def design_of(written: str) -> Design | None:
     """Design that a specimen's name stands for, or None."""
-    return _design(_kind(specimen_name.parse(written)))[0]
+    return _design(specimen_name.parse(written))
 
 
-def _kind(name: specimen_name.SpecimenName) -> specimen_name.SpecimenName:
-    """The part of a name that decides its design."""
-    return dataclasses.replace(name, iteration=None, replicate=None, place="", raw="", assumed=())
+def _design(name: specimen_name.SpecimenName) -> Design | None:
+    return _design_of(dataclasses.replace(name, iteration=None, replicate=None, place="", raw="", assumed=()))
 
 
 @lru_cache(maxsize=256)
-def _design(name: specimen_name.SpecimenName) -> tuple[Design | None, tuple[str, str]]:
-    """Design, and its identity and name."""
+def _design_of(kind: specimen_name.SpecimenName) -> Design | None:
+    """Design of the part of a name that decides it."""
     try:
-        design = specimen_name.design_of(name)
+        return specimen_name.design_of(kind)
     except SensorgenError:  # a film that no design may have
-        design = None
-    return design, (design.id(), design.name) if design else ("", "")
+        return None
 
 
 @lru_cache(maxsize=1 << 14)
-def _by_name(written: str) -> tuple[Specimen, tuple[str, str], tuple[str, ...]]:
-    """Specimen, identity and name of its design, and doubts, by a name that is bound to no design."""
+def _by_name(written: str) -> Named:
+    """Specimen by a name that is bound to no design; one without a film is usual in early iterations only."""
     name = specimen_name.parse(written)
-    columns = {key: getattr(name, key) for key in SPECIMEN_COLUMNS[1:]}
-    return Specimen(specimen=name.name, **columns), _design(_kind(name))[1], name.assumed
+    of = Specimen(specimen=name.name, **{key: getattr(name, key) for key in SPECIMEN_COLUMNS[1:]})
+    design, film_expected = _design(name), (name.iteration or 0) < FIRST_WITH_FILMS
+    doubts = tuple(doubt for doubt in name.assumed if doubt != specimen_name.NO_FILM or film_expected)
+    return Named(of, design.id() if design else "", design.name if design else "", doubts)

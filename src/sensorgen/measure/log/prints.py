@@ -86,7 +86,7 @@ def rows(path: Path, file: RawFile) -> Iterator[Entry]:
 
 
 def _piece(batch: str, name: str, piece: _Piece, record: _Record) -> Iterator[Entry]:
-    of = notes.specimen(name)
+    of = notes.named(name).specimen
     yield Print(
         **vars(of), uid=f"{batch} {of.specimen}", batch_uid=batch, design_id=piece.design_id, design=piece.design
     )
@@ -221,7 +221,7 @@ def _prints(log: Log, names: Sequence[str], of: Design, on_bed: Print | None, it
 
 
 def _on_bed(log: Log, printed: str) -> Print:
-    on_bed = log.bound(" ".join(printed.split())) or log.bound(notes.specimen(printed).specimen)
+    on_bed = log.bound(" ".join(printed.split())) or log.bound(notes.named(printed).specimen.specimen)
     if on_bed is None:
         raise BadInput(f"no print {shown(printed)} in the log; sensorgen log import batch.json logs those of a bed")
     return on_bed
@@ -278,7 +278,7 @@ def predict(log: Log, specimen: str) -> list[Entry]:
     MissingValue
         The name stands for no design, or the log lacks the design that it is bound to.
     """
-    bound = log.bound(notes.specimen(specimen, log).specimen)
+    bound = log.bound(notes.named(specimen, log).specimen.specimen)
     design = designs(log).get(bound.design_id) if bound else notes.design_of(specimen)
     design_id = bound.design_id if bound else design.id() if design else ""
     if design_id and log.predictions(design_id=design_id):

@@ -12,7 +12,7 @@ import shutil
 import tempfile
 import zipfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -28,7 +28,6 @@ from sensorgen.measure.log.logbook import Log, Merging
 
 MOST_BYTES = 2_000_000_000  # of an archive when unpacked
 MOST_LINE = 100_000_000  # bytes of one record
-_FIELDS = ("id", "parents", "kind", "version", "logged_at", "content")
 
 
 @dataclass(frozen=True)
@@ -217,15 +216,13 @@ def _records(path: Path, start: int, word: bytes = b"") -> Iterator[tuple[Record
 
 
 def _parsed(line: str, path: Path) -> Record:
-    try:
+    with suppress(ValueError, TypeError, KeyError, RecursionError):
         data = json.loads(line)
         record = Record(**{**data, "parents": tuple(data["parents"])})
-    except (ValueError, TypeError, KeyError, RecursionError):
-        record = None
-    texts = (record.id, record.kind, record.logged_at, record.content, *record.parents) if record else (None,)
-    if record is None or type(record.version) is not int or not all(type(text) is str for text in texts):
-        raise BadInput(f"{path}: {line!r:.60} is no record; expected a file as sensorgen log sync writes it")
-    return record
+        texts = (record.id, record.kind, record.logged_at, record.content, *record.parents)
+        if type(record.version) is int and all(type(text) is str for text in texts):
+            return record
+    raise BadInput(f"{path}: {line!r:.60} is no record; expected a file as sensorgen log sync writes it")
 
 
 def _push(log: Log, folder: Path, there: Sequence[int]) -> int:
@@ -255,9 +252,7 @@ def _push(log: Log, folder: Path, there: Sequence[int]) -> int:
         with part.open("wb") as lines:
             for number, record in enumerate(log.records(), 1):
                 if number >= len(there) or not there[number]:
-                    line = (
-                        json.dumps({name: getattr(record, name) for name in _FIELDS}, ensure_ascii=False) + "\n"
-                    ).encode()
+                    line = f"{json.dumps(vars(record), ensure_ascii=False)}\n".encode()
                     digest.update(line)
                     lines.write(line)
                     sent += 1

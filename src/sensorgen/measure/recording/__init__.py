@@ -14,14 +14,14 @@ from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording import samples
-from sensorgen.measure.recording.rig import Joined, RigLog, joined, joined_all, rig
+from sensorgen.measure.recording.rig import Joined, RigLog, joined_all, rig
 from sensorgen.measure.recording.samples import MOST_TONES, MOST_VALUES, Recording, RecordingClock, Source
 from sensorgen.measure.recording.spool import MOST_BYTES, FileSpool
 
 if TYPE_CHECKING:
     from sensorgen.measure.readings import Readings
 
-__all__ = ["Joined", "Recording", "RecordingClock", "RigLog", "Source", "joined", "joined_all", "parts", "rig"]
+__all__ = ["Joined", "Recording", "RecordingClock", "RigLog", "Source", "joined_all", "parts", "rig"]
 
 TIME, STAMP, CLIPPED, VALID = "time_s", "stamp_s", "clipped", "valid"
 

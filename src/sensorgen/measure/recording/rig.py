@@ -463,12 +463,7 @@ class Joined:
     notes: tuple[str, ...] = ()
 
 
-def joined(recording: Recording, rig: RigLog, within_s: float = np.inf) -> Joined:
-    """One recording joined with the rig's log; parameters and errors as :func:`joined_all`."""
-    return joined_all((recording,), rig, within_s)[0]
-
-
-def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = np.inf) -> tuple[Joined, ...]:
+def joined_all(recordings: Sequence[Recording], rig: RigLog) -> tuple[Joined, ...]:
     """All lock-ins of a file, each joined with the rig's log.
 
     They share one clock: the offset with the least standard error is used for all of them, also for a lock-in that
@@ -479,10 +474,8 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
     recordings : sequence of Recording
         Recordings of the lock-ins.
     rig : RigLog
-        Log of the rig; rows with errors are ignored.
-    within_s : float
-        Largest offset of the clocks; if not given, any offset with half of the shorter record in common, or a second
-        where one computer stamped both [s].
+        Log of the rig; rows with errors are ignored. Its clock has any offset with half of the shorter record in
+        common, or up to a second where one computer stamped both.
 
     Raises
     ------
@@ -491,8 +484,8 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
     """
     common_clock = all(np.isfinite(one.clock.epoch_s) for one in recordings)
     times = [one.clock.real_s(one.time_s) if common_clock else one.time_s for one in recordings]
-    limit_s = min(within_s, _STAMPED_S) if common_clock and rig.stamped else np.inf
-    offset = _best(recordings, times, rig, min(within_s, limit_s))
+    limit_s = _STAMPED_S if common_clock and rig.stamped else np.inf
+    offset = _best(recordings, times, rig, limit_s)
     if offset.by_chance or abs(offset.offset_s) > limit_s:  # its refinement looks beyond
         _refuse_apart(times[0], rig, offset, 0.0 if common_clock else 0.5)
         offset = replace(offset, offset_s=0.0, offset_error_s=np.nan, skew=0.0, skew_error=np.nan)

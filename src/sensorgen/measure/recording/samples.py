@@ -150,12 +150,43 @@ class Recording:
         cls, impedance_ohm: Complex, tones_hz: Real, time_s: Real | None, stamp_s: Real | None, source: Source,
         **marks: Mask,
     ) -> Self:  # fmt: skip
-        """Recording with the clock of :func:`rebuilt`; impedances of 0 and those that are no numbers become nan."""
-        count = len(impedance_ohm)
-        by = rebuilt(count, time_s, stamp_s)
-        source = replace(source, rate_hz=rate_hz(by.time_s), notes=source.notes + by.notes)
-        every = blank(count) | by.marks | sifted(impedance_ohm) | marks
-        return cls(by.time_s, tones_hz, impedance_ohm, every, by.clock, source)
+        """Recording with a rising time of every sample; impedances of 0 and those that are no numbers become nan.
+
+        Parameters
+        ----------
+        impedance_ohm : (n, m) array
+            Readings [ohm].
+        tones_hz : (m,) array
+            Frequencies [Hz].
+        time_s : (n,) array, optional
+            Time by the instrument [s]; replaced by even steps, with its gaps, unless it rises everywhere.
+        stamp_s : (n,) array, optional
+            Stamps by the computer's clock, in seconds since 1970 [s].
+        source : Source
+            Origin, without rate and notes of the clock.
+        **marks
+            Marked samples, by the names of ``MARKS``.
+
+        Raises
+        ------
+        BadInput
+            Neither gives a sampling rate.
+        """
+        time_s, stamp_s = (None if t is None else np.where(np.abs(t) < _LATEST_S, t, np.nan) for t in (time_s, stamp_s))
+        every, clock = blank(len(impedance_ohm)) | sifted(impedance_ohm) | marks, RecordingClock()
+        time, notes = _instrument_time(len(impedance_ohm), time_s, stamp_s, every["gap"])
+        if stamp_s is not None:
+            steps = np.diff(stamp_s)
+            every["reversed stamp"][1:], every["repeated stamp"][1:] = steps < 0, steps == 0
+            every["no stamp"][:] = ~np.isfinite(stamp_s)
+        if stamp_s is not None and not every["no stamp"].all():
+            first = _block_starts(stamp_s)
+            lost, set_back, more = _followed(time, first, stamp_s)
+            every["gap"] |= lost > 0
+            time += np.cumsum(lost)
+            clock, notes = _fitted(time[first], (stamp_s - set_back)[first]), notes + more
+        source = replace(source, rate_hz=rate_hz(time), notes=source.notes + notes)
+        return cls(time, tones_hz, impedance_ohm, every, clock, source)
 
     def counts(self) -> dict[str, int]:
         """Number of samples, of valid samples, and of samples with each mark."""
@@ -248,62 +279,6 @@ _SAME_STEP = 1e-3  # relative difference of two steps that count as equal
 _FEW = 0.02  # share of samples whose time does not rise that are placed between their neighbours
 _LEAST_BLOCKS, _UNEQUAL = 8, 0.25  # fewer steps of another length, or less even ones, are gaps and not blocks
 _LAGS = (50, 2)  # of the run over the distance of stamps whose slope is the step: jumps need it, and it needs them
-
-
-@dataclass(frozen=True, eq=False)
-class Rebuilt:
-    """Sample times of a recording.
-
-    Attributes
-    ----------
-    time_s : (n,) array
-        Rising [s].
-    clock : RecordingClock
-        Relation to real time.
-    marks : dict of str to (n,) array
-        Marks of gaps and of bad stamps.
-    notes : tuple of str
-        Corrections that were made.
-    """
-
-    time_s: Real
-    clock: RecordingClock
-    marks: dict[str, Mask]
-    notes: tuple[str, ...]
-
-
-def rebuilt(count: int, time_s: Real | None, stamp_s: Real | None) -> Rebuilt:
-    """Rising time of every sample.
-
-    Parameters
-    ----------
-    count : int
-        Number of samples.
-    time_s : (count,) array, optional
-        Time by the instrument [s]; replaced by even steps, with its gaps, unless it rises everywhere.
-    stamp_s : (count,) array, optional
-        Stamps by the computer's clock, in seconds since 1970 [s].
-
-    Raises
-    ------
-    BadInput
-        Neither gives a sampling rate.
-    """
-    time_s, stamp_s = (None if t is None else np.where(np.abs(t) < _LATEST_S, t, np.nan) for t in (time_s, stamp_s))
-    marks = {name: np.zeros(count, bool) for name in ("gap", "reversed stamp", "repeated stamp", "no stamp")}
-    even, notes = _instrument_time(count, time_s, stamp_s, marks["gap"])
-    if stamp_s is None:
-        return Rebuilt(even, RecordingClock(), marks, notes)
-    steps = np.diff(stamp_s)
-    marks["reversed stamp"][1:], marks["repeated stamp"][1:] = steps < 0, steps == 0
-    marks["no stamp"][:] = ~np.isfinite(stamp_s)
-    if marks["no stamp"].all():
-        return Rebuilt(even, RecordingClock(), marks, notes)
-    first = _block_starts(stamp_s)
-    lost, set_back, more = _followed(even, first, stamp_s)
-    marks["gap"] |= lost > 0
-    even += np.cumsum(lost)
-    return Rebuilt(even, _fitted(even[first], (stamp_s - set_back)[first]), marks, notes + more)
 
 
 def _instrument_time(count: int, time_s: Real | None, stamp_s: Real | None, gap: Mask) -> tuple[Real, tuple[str, ...]]:

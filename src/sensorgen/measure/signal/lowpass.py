@@ -25,7 +25,7 @@ _EVEN = 1e-3  # of a step: deviation of even samples
 _MOST_STEPS = 1 << 22  # even steps of a recording
 
 
-def sections(rate_hz: float, cutoff_hz: float = CUTOFF_HZ, order: int = ORDER) -> Real:
+def sections(rate_hz: float, cutoff_hz: float = CUTOFF_HZ) -> Real:
     """Second-order sections of the low-pass.
 
     Parameters
@@ -34,8 +34,6 @@ def sections(rate_hz: float, cutoff_hz: float = CUTOFF_HZ, order: int = ORDER) -
         Sampling rate [Hz].
     cutoff_hz : float
         Cut-off frequency: -3 dB in one pass, -6 dB forward and backward [Hz].
-    order : int
-        Order of the filter.
 
     Raises
     ------
@@ -48,7 +46,7 @@ def sections(rate_hz: float, cutoff_hz: float = CUTOFF_HZ, order: int = ORDER) -
         raise OutOfRange(
             f"a cut-off of {cutoff_hz:g} Hz at {rate_hz:g} samples/s; expected one between 0 and half of it"
         )
-    return np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
+    return np.asarray(butter(ORDER, cutoff_hz, fs=rate_hz, output="sos"))
 
 
 @dataclass

@@ -65,6 +65,8 @@ class RunPlan:
         Length of each press and of each rest [s].
     repeats : int
         Number of repeats of each point.
+    design : str
+        Name of the design; "" if unknown.
     """
 
     seed: int
@@ -74,6 +76,7 @@ class RunPlan:
     dwell_s: float
     rest_s: float
     repeats: int = 0
+    design: str = ""
 
     def __post_init__(self) -> None:
         """Check the ranges."""
@@ -105,44 +108,18 @@ class RunPlan:
         """Length of the run [s]."""
         return self.rest_s + self.presses * (1 + self.repeats) * (self.dwell_s + self.rest_s)
 
-
-@dataclass(frozen=True)
-class Schedule:
-    """A plan with its presses.
-
-    Attributes
-    ----------
-    plan : RunPlan
-        Its parameters.
-    design : str
-        Name of the design.
-    seconds : float
-        Length of the run [s].
-    steps : tuple of Step
-        In the order of the run.
-    """
-
-    plan: RunPlan
-    design: str
-    seconds: float
-    steps: tuple[Step, ...]
-
     def to_json(self) -> str:
         """Parameters and presses."""
-        rest = {"seconds": self.seconds, "steps": [asdict(step) for step in self.steps], "design": self.design}
-        return json.dumps(asdict(self.plan) | rest, indent=2, ensure_ascii=False) + "\n"
+        data = {**asdict(self), "seconds": self.seconds(), "steps": [asdict(step) for step in self.steps()]}
+        return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
 
     def document(self) -> Iterator[Part]:
         """The presses, then their number and the length of the run."""
-        yield Table.of("presses", "", self.steps)
-        minutes, rest = divmod(round(self.seconds), 60)
+        steps = self.steps()
+        yield Table.of("presses", "", steps)
+        minutes, rest = divmod(round(self.seconds()), 60)
         hours, minutes = divmod(minutes, 60)
-        yield f"{len(self.steps)} presses, {f'{hours} h {minutes} min' if hours else f'{minutes} min {rest} s'}"
-
-
-def schedule(plan: RunPlan, design: str) -> Schedule:
-    """The presses of a plan for a design."""
-    return Schedule(plan, design, plan.seconds(), tuple(plan.steps()))
+        yield f"{len(steps)} presses, {f'{hours} h {minutes} min' if hours else f'{minutes} min {rest} s'}"
 
 
 THRESHOLD_N = 0.2

@@ -6,7 +6,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording.rig import NO_CLOCKS, Joined, RigLog, joined
+from sensorgen.measure.recording.rig import NO_CLOCKS, Joined
 from sensorgen.measure.recording.samples import Recording
 from sensorgen.measure.signal import drift, lowpass, presses
 from sensorgen.measure.signal.presses import THRESHOLD_N, by_force
@@ -59,7 +59,7 @@ class Processed:
 
 
 def processed(
-    recording: Recording, rig: RigLog | Joined | None = None, *, remove_drift: bool = True, law: str = "",
+    recording: Recording, rig: Joined | None = None, *, remove_drift: bool = True, law: str = "",
     cutoff_hz: float = lowpass.CUTOFF_HZ,
 ) -> Processed:  # fmt: skip
     """Process a recording.
@@ -68,8 +68,8 @@ def processed(
     ----------
     recording : Recording
         Recording of one lock-in.
-    rig : RigLog or Joined or None
-        Log of the rig, or the recording joined with it; without it, presses are detected in the readings.
+    rig : Joined or None
+        The recording joined with the log of a rig; without it, presses are detected in the readings.
     remove_drift : bool
         Whether to fit the drift between presses and remove it from the presses' readings.
     law : str
@@ -81,7 +81,7 @@ def processed(
     Raises
     ------
     BadInput
-        Clocks that cannot be joined; fewer than 16 valid samples.
+        Fewer than 16 valid samples.
     OutOfRange
         A cut-off frequency that is not between 0 and half the sampling rate.
     UnknownName
@@ -122,13 +122,12 @@ def _no_presses(force_n: Real, otherwise: str = "nothing pressed") -> str:
     return otherwise
 
 
-def _beside(recording: Recording, rig: RigLog | Joined | None) -> Joined:
-    """A recording with force and position, nan without a rig; notes on both."""
+def _beside(recording: Recording, rig: Joined | None) -> Joined:
+    """Recording with force and position, nan without a rig; notes on both."""
     if rig is None:
         unknown = np.full(len(recording.time_s), np.nan)
         return Joined(recording, unknown, unknown, unknown, NO_CLOCKS, recording.source.notes)
-    beside = joined(recording, rig) if isinstance(rig, RigLog) else rig
-    return replace(beside, notes=(*recording.source.notes, beside.clocks.words(), *beside.notes))
+    return replace(rig, notes=(*recording.source.notes, rig.clocks.words(), *rig.notes))
 
 
 def _drift(one: Recording, spans: list[presses.PressTimes], force_n: Real | None, law: str) -> drift.Drift:
