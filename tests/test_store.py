@@ -33,14 +33,14 @@ def test_staging_leaves_nothing_behind(tmp_path):
     assert names(tmp_path) == []
 
 
-@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt(), ValueError()])
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
 def test_staging_cleans_up_after_an_error(tmp_path, error):
     def fail():
         with store.staging(tmp_path / "x") as stage:
             store.write(stage, {"a": b"1"})
             raise error
 
-    with pytest.raises((Unwritable, KeyboardInterrupt, ValueError)):
+    with pytest.raises((Unwritable, KeyboardInterrupt)):
         fail()
     assert os.listdir(tmp_path) == []  # noqa: PTH208 - the empty folder too
 
@@ -77,7 +77,7 @@ def test_a_hostile_manifest_deletes_nothing_outside(tmp_path, name):
 
 @pytest.mark.parametrize(
     "text",
-    ["", "{", "[]", "3", '{"files": 3}', '{"files": [1, null]}', '{"files": {"a\\u0000/b": 0}}', "[" * 9_999, "\udcff"],
+    ["{", "[]", '{"files": 3}', '{"files": [1, null]}', '{"files": {"a\\u0000/b": 0}}', "[" * 9_999, "\udcff"],
     ids=lambda text: text[:20].encode("ascii", "replace").decode() or "empty",
 )  # fmt: skip
 def test_a_damaged_manifest_is_no_obstacle(tmp_path, text):
@@ -165,13 +165,6 @@ def test_whoever_publishes_second_waits_for_the_first(tmp_path, monkeypatch):
     for worker in workers:
         worker.join()
     assert order == [f"{who} {what}" for who in ("first", "second") for what in ("a", "b", store.MANIFEST)]
-
-
-def test_replace(tmp_path):
-    store.replace(tmp_path / "new/a.svg", b"1")
-    store.replace(tmp_path / "new/a.svg", b"2")
-    assert names(tmp_path) == ["new/a.svg"]
-    assert (tmp_path / "new/a.svg").read_bytes() == b"2"
 
 
 @pytest.mark.parametrize("place", [".", "..", "folder", "taken/a.svg"])

@@ -9,8 +9,6 @@ from hypothesis import strategies as st
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import (
     FORCE_N,
-    FREQUENCY_HZ,
-    LENGTH_MM,
     MOST_VALUES,
     force_n,
     frequency_hz,
@@ -25,65 +23,36 @@ NO_NUMBERS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("text", "mm"),
-    [
-        ("0.2", 0.2), ("0.2mm", 0.2), (" 0.2 MM ", 0.2), ("200um", 0.2), ("200µm", 0.2), ("200μm", 0.2), ("2cm", 20.0),
-        ("0.1m", 100.0), ("1e-1", 0.1), ("1e2 um", 0.1), ("-3", -3.0), ("+3", 3.0), (".5", 0.5), ("5.", 5.0),
-        ("0.2\u00a0mm", 0.2), ("0.2\u202fmm", 0.2),
-    ],
-)  # fmt: skip
-def test_length(text, mm):
-    assert length_mm(text) == mm
+READ = {
+    length_mm: {
+        "0.2": 0.2, "0.2mm": 0.2, " 0.2 MM ": 0.2, "200um": 0.2, "200µm": 0.2, "200μm": 0.2, "2cm": 20.0, "0.1m": 100.0,
+        "1e-1": 0.1, "-3": -3.0, "+3": 3.0, ".5": 0.5, "5.": 5.0, "0.2\u00a0mm": 0.2, "0.2\u202fmm": 0.2,
+    },
+    frequency_hz: {"1100": 1100.0, "10.1 khz": 10100.0, "2MHz": 2e6, "2mHz": 2e-3, "1.5GHz": 1.5e9, "0": 0.0},
+    force_n: {"6 N": 6.0, "6n": 6.0, "250mN": 0.25, "1KN": 1000.0, "1MN": 1e6, "1 kgf": 9.80665, "100 GF": 0.980665},
+}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("text", "hz"),
-    [
-        ("1100", 1100.0), ("10.1kHz", 10100.0), ("10.1 khz", 10100.0), ("10.1 KHZ", 10100.0), ("5hz", 5.0),
-        ("2MHz", 2e6), ("2mHz", 2e-3), ("1.5GHz", 1.5e9), ("1e-9", 1e-9), ("0", 0.0), ("-1kHz", -1000.0),
-    ],
-)  # fmt: skip
-def test_frequency(text, hz):
-    assert frequency_hz(text) == hz
-
-
-@pytest.mark.parametrize(
-    ("text", "n"),
-    [
-        ("6", 6.0), ("6 N", 6.0), ("6n", 6.0), ("250mN", 0.25), ("1.2kN", 1200.0), ("1KN", 1000.0), ("1MN", 1e6),
-        ("1 kgf", 9.80665), ("100gf", 0.980665), ("100 GF", 0.980665),
-    ],
-)  # fmt: skip
-def test_force(text, n):
-    assert force_n(text) == n
+@pytest.mark.parametrize(("read", "text", "value"), [(r, *pair) for r, texts in READ.items() for pair in texts.items()])
+def test_numbers_as_typed(read, text, value):
+    assert read(text) == value
 
 
 @pytest.mark.parametrize("text", NO_NUMBERS)
-@pytest.mark.parametrize(
-    ("read", "said"),
-    [
-        (length_mm, "is not a length: write a number, with mm, um, cm or m if you like"),
-        (frequency_hz, "is not a frequency: write a number, with Hz, mHz, kHz, MHz or GHz if you like"),
-        (force_n, "is not a force: write a number, with N, mN, kN, MN, gf or kgf if you like"),
-    ],
-)
-def test_no_number(read, said, text):
-    with pytest.raises(BadInput, match=said):
-        read(text)
+def test_no_number(text):
+    with pytest.raises(BadInput, match="is not a length: write a number, with mm, um, cm or m if you like"):
+        length_mm(text)
 
 
 @pytest.mark.parametrize(
     ("read", "text", "advice"),
     [
         (length_mm, "1,5", "decimals take a point, as in 1.5"),
-        (force_n, "1,5 N", "decimals take a point"),
-        (frequency_hz, "1mhz", "'mhz' may be mHz or MHz: mind upper and lower case"),
-        (frequency_hz, "1 MHZ", "'MHZ' may be mHz or MHz"),
-        (frequency_hz, "1Mhz", "'Mhz' may be mHz or MHz"),
+        (frequency_hz, "1 MHZ", "'MHZ' may be mHz or MHz: mind upper and lower case"),
         (force_n, "5mn", "'mn' may be mN or MN"),
         (force_n, "1e308kN", "it is too large"),
-        (frequency_hz, "9" * 310, "it is too large"),
+        (frequency_hz, "x", "is not a frequency: write a number, with Hz, mHz, kHz, MHz or GHz if you like"),
+        (force_n, "x", "is not a force: write a number, with N, mN, kN, MN, gf or kgf if you like"),
     ],
 )
 def test_what_to_do_instead(read, text, advice):
@@ -112,13 +81,6 @@ def test_text_of_a_frequency(text, hz):
 def test_text_of_a_frequency_is_read_back(hz):
     """But for the last bits of a number that a computation has left, as 3.000000000000001 MHz."""
     assert frequency_hz(frequency_text(hz)) == pytest.approx(hz, rel=1.1e-15, abs=0)
-
-
-def test_a_span_holds_its_stop_and_decimals_as_typed():
-    found = values("0:6:0.1", FORCE_N)
-    assert len(found) == 61
-    assert [repr(x) for x in found] == [f"{k // 10}.{k % 10}" for k in range(61)]
-    assert values("0:100:1", LENGTH_MM) == tuple(map(float, range(101)))
 
 
 @given(st.integers(0, 10**6), st.integers(1, 10**4), st.integers(0, 300), st.integers(0, 5))
@@ -152,19 +114,14 @@ def test_values(text, expected):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "'' has an empty part; expected start:stop:step as in 0:6:0.1"), ("1,,2", "empty part"),
-        ("1,", "empty part"),
-        ("0::1", "empty part"), (":6:1", "empty part"), ("0:6", "'0:6': expected start:stop:step"),
-        ("0:6:1:1", "expected start:stop:step"), ("0:6:0", "step above 0"), ("0:6:-1", "step above 0"),
-        ("6:0:-1", "step above 0"), ("6:0:1", "stop not below the start"), ("2,1", "1 stands after 2; expected rising"),
-        ("1,1", "1 stands twice; expected rising values, each once"), ("0:3:1,3", "3 stands twice"),
-        ("1,1.00000000000000000001", "1 stands twice"), ("1N,1000mN", "1 stands twice"),
-        ("1,2N,3", "'1' has no unit"),
+        ("", "'' has an empty part; expected start:stop:step as in 0:6:0.1"), ("1,", "empty part"),
+        ("0::1", "empty part"), ("0:6", "'0:6': expected start:stop:step"), ("0:6:1:1", "expected start:stop:step"),
+        ("0:6:0", "step above 0"), ("6:0:1", "stop not below the start"), ("2,1", "1 stands after 2; expected rising"),
+        ("0:3:1,3", "3 stands twice; expected rising values, each once"),
+        ("1,1.00000000000000000001", "1 stands twice"), ("1N,1000mN", "1 stands twice"), ("1,2N,3", "'1' has no unit"),
         ("1N,2", "'2' has no unit; give it to each number, or to the last one"), ("0:6N:1", "'0' has no unit"),
-        ("nan", "'nan' is not a force"), ("0:nan:1", "'nan' is not a force"), ("0:inf:1", "'inf' is not a force"),
-        ("0:1:1e-999", f"more than {MOST_VALUES} values"), ("1;2", "'1;2' is not a force"),
-        ("1e308kN,2e308kN", "too large"),
-        ("0:1e99:1", f"more than {MOST_VALUES} values"),
+        ("0:nan:1", "'nan' is not a force"), ("0:1:1e-999", f"more than {MOST_VALUES} values"),
+        ("1e308kN,2e308kN", "too large"), ("0:1e99:1", f"more than {MOST_VALUES} values"),
     ],
 )  # fmt: skip
 def test_no_values(text, said):
@@ -180,6 +137,3 @@ def test_how_many_values_there_may_be():
             values(text, FORCE_N)
 
 
-def test_frequencies_mix_units():
-    assert values("1.1kHz,2.3kHz,1MHz", FREQUENCY_HZ) == (1100.0, 2300.0, 1e6)
-    assert values("1.1,2.3,5.3kHz", FREQUENCY_HZ) == (1100.0, 2300.0, 5300.0)

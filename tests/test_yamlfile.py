@@ -23,10 +23,6 @@ def test_plain_values(text, value):
     assert (type(found), found) == (type(value), value)
 
 
-def test_not_a_number():
-    assert math.isnan(yamlfile.parse("a: .nan", "f")["a"])
-
-
 def test_depth_at_its_limit():
     deepest = "{a: " * (yamlfile.MAX_DEPTH - 1) + "1" + "}" * (yamlfile.MAX_DEPTH - 1)
     assert yamlfile.parse(f"a: {deepest}", "f")
@@ -43,15 +39,15 @@ def test_size_at_its_limit(tmp_path):
         yamlfile.read(path)
 
 
-@pytest.mark.parametrize("tag", ["!!str", "!!int", "!", "!own", "!!python/name:os.system", "!!binary", "!!set", "!<x>"])
+@pytest.mark.parametrize("tag", ["!!str", "!", "!own", "!!python/name:os.system", "!<x>"])
 @pytest.mark.parametrize("text", ["a: {} 1", "{} {{a: 1}}", "a: {} [1]"])
 def test_tags_are_refused_wherever_they_stand(tag, text):
     with pytest.raises(BadInput, match=r"f: line 1: tags \(!name\) are not taken"):
         yamlfile.parse(text.format(tag), "f")
 
 
-def test_an_anchor_that_nobody_uses_does_no_harm():
-    assert yamlfile.parse("a: &x 1", "f") == {"a": 1}
+def test_not_a_number_and_an_anchor_that_nobody_uses():
+    assert math.isnan(yamlfile.parse("a: &x .nan", "f")["a"])
 
 
 def test_a_path_with_a_zero_byte(tmp_path):
