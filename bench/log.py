@@ -23,7 +23,7 @@ from sensorgen.measure.log.notes import reading
 
 HERE = Path(__file__).parent
 TESTS = HERE.parent / "tests" / "log"
-READINGS, SAMPLES, KILLS, FILES = 100_000, 1_000_000, 200, 10_000
+READINGS, SAMPLES, KILLS = 100_000, 1_000_000, 200
 TONES_HZ = [1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3]
 RUNS = 5
 COMMAND = """
@@ -192,7 +192,6 @@ def main():
             of_an_iteration(folder),
             of_a_recording(folder),
             of_chance(folder, "`kill -9` at random moments", "kills.py", KILLS, "200 kills, 0 faults"),
-            of_chance(folder, "Files tampered with", "fuzz.py", FILES, "10 000 files, 0 faults"),
         ):
             for what, got, target in work:
                 lines.append(f"| {what} | {got} | {target} |")

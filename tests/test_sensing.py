@@ -25,7 +25,7 @@ def test_the_plate_of_table_3_1():
     assert "bonded" in found.doubts[0]
 
 
-@pytest.mark.parametrize(("shape", "film"), [("tri", 0.1), ("tri", 0.2), ("rect", 0.1), ("rect", 0.2)])
+@pytest.mark.parametrize(("shape", "film"), [("tri", 0.1), ("rect", 0.2)])
 def test_solved_cells_answer_for_themselves(shape, film):
     found = sensed(shape, parameters={"dielectric_mm": film})
     assert found.sensor.compression.name == "solved"
@@ -44,16 +44,11 @@ FIRM = {"film": "x60@thesis-4.1", "dielectric": "x60@thesis-4.1"}  # another mod
     ("shape", "rest"),
     [
         ("rect", {"parameters": {"air_width_mm": 0.4}}),
-        ("tri", {"parameters": {"period_mm": 2.5}}),
         ("tri", {"materials": FIRM}),
-        ("tri", {"material_values": {"x60": {"poisson_ratio": 0.45}}}),
         ("tri", {"material_values": {"etpu": {"poisson_ratio": 0.3}}}),
-        ("tri", {"material_values": {"x60": {"relative_permittivity": 6.33}}}),
         ("rect", {"material_values": {"x60": {"relative_permittivity": 6.33}}}),
         ("tri", {"materials": {"film": "ninjaflex"}, "tools": {"ninjaflex": 1}}),
-        ("tri", {"parameters": {"tip_mm": 0.2}}),
         ("tri", {"parameters": {"electrode_mm": 0.1}}),
-        ("rect", {"parameters": {"angle_deg": 60.0}}),
     ],
 )
 def test_other_cells_are_taken_for_free_plates_and_that_is_said(shape, rest):

@@ -135,5 +135,3 @@ def test_how_many_values_there_may_be():
     for text in (f"0:{MOST_VALUES}:1", f"1:{MOST_VALUES}:1,{MOST_VALUES + 1}"):
         with pytest.raises(BadInput, match=f"more than {MOST_VALUES} values in all; expected fewer: use a larger step"):
             values(text, FORCE_N)
-
-

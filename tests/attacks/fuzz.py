@@ -17,7 +17,7 @@ import sys
 import tempfile
 import traceback
 from collections import Counter
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
 
@@ -46,12 +46,30 @@ def command(*words):
     return read
 
 
+@contextmanager
+def told(name=""):
+    """Refusals that are one line, which names the file."""
+    from sensorgen.core.errors import SensorgenError
+
+    try:
+        yield
+    except SensorgenError as error:
+        words = str(error)
+        assert name in words, words
+        assert len(words) < 1000, words
+        assert "\n" not in words, words
+        raise
+
+
 def recordings(folder):
-    """Recordings and a log of the rig, by kind."""
+    """Recordings and a log of the rig, and their readers by kind."""
     sys.path.insert(0, str(ROOT / "tests/recording"))
     import h5py
     import made
+    import numpy as np
     import scipy.io as sio
+
+    from sensorgen.measure.recording import parts, rig
 
     run = made.run(made.presses(2))
     z, t, tones = run.impedance_ohm[:1500, :2], run.time_s[:1500], made.TONES_HZ[:2]
@@ -65,6 +83,68 @@ def recordings(folder):
     (folder / "whole.csv").write_text("time_s,stamp_s,re_ohm_1kHz,im_ohm_1kHz\n" + "\n".join(rows) + "\n")
     made.write_rig(folder / "whole.rig", [c[:300] for c in made.rig_rows(made.presses(2))])
 
+    def recording(file):
+        with told(file.name):
+            for one in (one for lockins in parts(file) for one in lockins):
+                assert (np.diff(one.time_s) > 0).all()
+                assert one.impedance_ohm.shape == (len(one.time_s), len(one.tones_hz))
+        command("bench", "show", None)(file)
+
+    def of_rig(file):
+        with told(file.name):
+            log = rig(file)
+            assert len(log.time_s) == len(log.error)
+        command("bench", "show", folder / "whole.csv", "--rig", None)(file)
+
+    return dict.fromkeys(("mat", "packed", "hdf5", "csv"), (recording, "")) | {"rig": (of_rig, "")}
+
+
+BATCH = {
+    "batch": "26",
+    "specimens": {
+        "26 triX .1mm": {"design": "trix-d0.1", "design_id": "0" * 16, "expected": {"capacitance_f": {"lower": 1e-11}}},
+        "26 triX .1mm 2": {"design": "trix-d0.1", "design_id": "0" * 16, "expected": {}},
+    },
+}
+
+
+def logged(folder):
+    """Tables, a print bed, exports and a log, and their readers by kind; a refused file leaves a log as it was."""
+    from sensorgen.core.errors import SensorgenError
+    from sensorgen.measure.log import Log, exchange, verify
+
+    rows = exchange.thesis_readings()[:12]
+    with Log(folder / "whole.db", create=True) as log:
+        log.add(rows)
+        for kind in ("csv", "parquet"):
+            exchange.export(log, folder / f"export.{kind}")
+    (folder / "export.csv").rename(folder / "whole.table")
+    (folder / "export.parquet").rename(folder / "whole.parquet")
+    words = "\n".join(f"{r.written},{r.y_words},{r.z_words},{r.remark}" for r in rows)
+    (folder / "whole.words").write_text(f"Design,Resistance in Y,Resistance in Z,Remarks\n{words}\n", "utf-8")
+    (folder / "whole.batch").write_text(json.dumps(BATCH), "utf-8")
+
+    def take(file):
+        with Log(folder / "log.db", create=True) as log:
+            before = log.head()
+            try:
+                with told():
+                    exchange.import_file(log, file, {})
+            except SensorgenError:
+                assert log.head() == before
+                raise
+
+    def read(file):
+        for left in ("-wal", "-shm"):
+            Path(f"{file}{left}").unlink(missing_ok=True)
+        with told(), Log(file) as log:
+            log.readings(last=40)
+            if faults := list(verify.faults(log)):
+                raise SensorgenError(faults[0])
+
+    suffixes = {"table": "", "words": "", "parquet": ".parquet", "batch": ".json"}
+    return {kind: (take, suffix) for kind, suffix in suffixes.items()} | {"db": (read, ".db")}
+
 
 def samples(folder):
     """Whole files by kind, with their readers."""
@@ -76,7 +156,7 @@ def samples(folder):
     sys.path.insert(0, str(ROOT / "tests/gcode"))
     import good
 
-    recordings(folder)
+    readers = recordings(folder) | logged(folder)
     (folder / "whole.invert").write_bytes((folder / "whole.csv").read_bytes())
     (folder / "whole.gcode").write_text(good.MAKER)
     for kind, name in (("printer", "printers/diabase-h5"), ("quality", "qualities/fine")):
@@ -91,11 +171,8 @@ def samples(folder):
     def design(file):
         _ = api.load(file).printed
 
-    show = command("bench", "show", None)
-    return {
-        "mat": (show, ""), "packed": (show, ""), "hdf5": (show, ""), "csv": (show, ""),
-        "rig": (command("bench", "show", folder / "whole.csv", "--rig", None), ""), "invert": (table, ""),
-        "gcode": (command("gcode", "check", None), ".gcode"),
+    return readers | {
+        "invert": (table, ""), "gcode": (command("gcode", "check", None), ".gcode"),
         "printer": (lambda file: printer.load_printer(str(file)), ".yaml"),
         "quality": (lambda file: printer.load_quality(str(file)), ".yaml"), "plan": (plan.load, ".yaml"),
         "design": (design, ".yaml"),
@@ -148,7 +225,10 @@ def work(jobs, seed, folder, results):
     results.put((-1, "peak", str(peak)))
 
 
-KINDS = ("mat", "packed", "hdf5", "csv", "rig", "invert", "gcode", "printer", "quality", "plan", "design")
+KINDS = (
+    "mat", "packed", "hdf5", "csv", "rig", "table", "words", "parquet", "batch", "db", "invert", "gcode", "printer",
+    "quality", "plan", "design",
+)  # fmt: skip
 
 
 def fuzz(jobs, seed):

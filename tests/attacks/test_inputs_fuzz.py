@@ -3,7 +3,10 @@
 import fuzz
 import pytest
 
-COUNTS = {"mat": 10, "hdf5": 10, "csv": 10, "rig": 10, "gcode": 20, "printer": 30, "plan": 20, "design": 20}
+COUNTS = {
+    "mat": 60, "packed": 30, "hdf5": 30, "csv": 30, "rig": 30, "table": 60, "words": 60, "parquet": 60, "batch": 60,
+    "db": 60, "gcode": 20, "printer": 30, "plan": 20, "design": 20,
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

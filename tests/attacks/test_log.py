@@ -19,7 +19,7 @@ from sensorgen.measure.log.prints import prediction
 
 HERE = Path(__file__).parent
 LONG = bool(os.environ.get("SENSORGEN_ATTACK"))
-FLIPS = 3500 if LONG else 200
+FLIPS = 3500 if LONG else 120
 
 
 @pytest.mark.parametrize(("every", "least"), [(1, 1000)] if LONG else [

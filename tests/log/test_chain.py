@@ -2,7 +2,6 @@
 
 import csv
 import json
-import random
 import sqlite3
 from datetime import UTC, datetime, timedelta
 from hashlib import sha256
@@ -79,27 +78,6 @@ def test_every_edit_by_sql_is_found(full, path, statements):
     by_the_back_door(path, *statements)
     with Log(path) as again:
         assert list(verify.faults(again))
-
-
-def test_bits_that_flip_are_found(full, path, tmp_path):
-    """A sample; the long part of the attacks flips 3500. What has no part in the content may flip unseen."""
-    full.pragma("wal_checkpoint(TRUNCATE)")
-    content, before = path.read_bytes(), [(r.id, r.content, r.logged_at) for r in full.records()]
-    rng = random.Random(5)
-    other = tmp_path / "other.db"
-    for _ in range(150):
-        flipped = bytearray(content)
-        flipped[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
-        other.write_bytes(flipped)
-        for left in ("-wal", "-shm"):
-            other.with_name(f"other.db{left}").unlink(missing_ok=True)
-        try:
-            with Log(other) as log:
-                found = list(verify.faults(log))
-                rows = [(r.id, r.content, r.logged_at) for r in log.records()]
-        except BadInput:
-            continue
-        assert found or rows == before
 
 
 def test_whoever_rewrites_the_whole_chain_is_found_by_an_anchor(full, path, tmp_path):
@@ -216,13 +194,10 @@ def test_the_claim_of_an_export_proves_nothing(log, tmp_path):
 
 MALFORMED = [
     {"reason": 5}, {"electrode_resistance_ohm": {"top": [1]}}, {"electrode_resistance_ohm": 5},
-    {"electrode_resistance_ohm": {"top": "x"}}, {"electrode_resistance_ohm": [1, 2]}, {"capacitance_f": 1e-11},
     {"schema": 3, "values": 5}, {"capacitance_f": {"upper": 1e-11}}, {"capacitance_f": [1, 2]},
-    {"capacitance_f": {"lower": "a", "upper": "b"}}, {"capacitance_f": "x"}, {"corner_frequency_hz": 3},
-    {"corner_frequency_hz": {"lower": None, "upper": "x"}}, {"identifiability": 5}, {"identifiability": [1]},
-    {"identifiability": {"press": 5}}, {"identifiability": {"press": [1]}}, {"identifiability": "x"},
+    {"capacitance_f": {"lower": "a", "upper": "b"}}, {"corner_frequency_hz": {"lower": None, "upper": "x"}},
+    {"identifiability": 5}, {"identifiability": {"press": [1]}},
     {"schema": 3}, {"schema": 4}, {"schema": 5}, {"schema": 2}, {"schema": "3"}, {"schema": None},
-    {"schema": 3, "design": 5},
     {"schema": 3, "capacitance": {"value": "x"}}, {"schema": 2, "force_resolution_n": "x"}, {"schema": [3]},
     {"schema": 3, "status": "fine"},
 ]  # fmt: skip

@@ -2,10 +2,8 @@
 
 import json
 import os
-import shutil
 import subprocess
 import sys
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -20,27 +18,15 @@ HERE = Path(__file__).parent
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals and limits of POSIX")
 
 
-def seen(program, folder, count):
-    done = subprocess.run(
-        [sys.executable, HERE / program, folder, str(count), "7"], capture_output=True, encoding="utf-8"
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
-@pytest.mark.parametrize("kills", [40, pytest.param(200, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("kills", [20, pytest.param(200, marks=pytest.mark.nightly)])
 def test_killed_at_random_moments(tmp_path, kills):
-    found = seen("kills.py", tmp_path, kills)
+    words = [sys.executable, HERE / "kills.py", tmp_path, str(kills), "7"]
+    done = subprocess.run(words, capture_output=True, encoding="utf-8")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
     assert found["faults"] == []
     assert found["promised"] > kills / 2
     assert [p.name for p in tmp_path.glob(".*.part")] == []
-
-
-def test_files_that_were_tampered_with(tmp_path):
-    found = seen("fuzz.py", tmp_path, 600)
-    assert found["faults"] == []
-    for name in ("table.csv", "table.parquet", "words.csv", "batch.json", "sound.db"):
-        assert found[f"{name} refused"] > 20
 
 
 @pytest.fixture
@@ -60,7 +46,7 @@ def assert_told(done, *said):
     assert any(word in done.err for word in said), done.err
 
 
-@pytest.mark.parametrize("room", [0, 8, 40])
+@pytest.mark.parametrize("room", [0, 40])
 def test_a_full_disk_is_told_and_costs_nothing(tmp_path, room, command):
     path = tmp_path / "log.db"
     with Log(path, create=True) as log:
@@ -106,25 +92,3 @@ def test_a_disk_that_is_really_full(tmp_path):
             assert list(verify.faults(log)) == []
     finally:
         subprocess.run(["umount", place], check=True)
-
-
-@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no users on this system")
-def test_a_log_that_may_only_be_read():
-    place = Path(tempfile.mkdtemp())  # pytest's own folders are for this user only
-    path = place / "log.db"
-    with Log(path, create=True) as log:
-        log.add([reading("23 triX", "650")])
-    place.chmod(0o555)
-    path.chmod(0o444)
-    root = os.geteuid() == 0
-    if root:
-        os.seteuid(65534)
-    try:
-        with Log(path) as log:
-            assert len(log.readings()) == 1
-            with pytest.raises(Unwritable, match=r"cannot write to the log .*read-only; nothing was logged"):
-                log.add([reading("23 triX", "650")])
-    finally:
-        if root:
-            os.seteuid(0)
-        shutil.rmtree(place)

@@ -41,10 +41,8 @@ def opened(address):
 @pytest.mark.parametrize(
     ("address", "wires", "said", "name"),
     [
-        (HP, 2, "+6.50000000E+02", "HP 34401A (HEWLETT-PACKARD,34401A,0,10-5-2)"),
         (HP, 4, "+6.48100000E+02", "HP 34401A (HEWLETT-PACKARD,34401A,0,10-5-2)"),
         ("ASRL1::INSTR", 2, "+6.50000000E+02", "HP 34401A (HEWLETT-PACKARD,34401A,0,10-5-2)"),
-        (KEITHLEY, 2, "+1.30000000E+03", "Keithley 2000 (KEITHLEY INSTRUMENTS INC.,MODEL 2000,1234567,A20  /A02)"),
         (KEITHLEY, 4, "+1.29800000E+03", "Keithley 2000 (KEITHLEY INSTRUMENTS INC.,MODEL 2000,1234567,A20  /A02)"),
     ],
 )

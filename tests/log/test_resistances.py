@@ -18,20 +18,13 @@ PLAIN = {
 DOUBTFUL = {
     "0.9K": (900.0, "K read as kilo"),
     "1.1m": (1.1e6, "m read as mega"),
-    "0.3m": (3e5, "m read as mega"),
     "12 mΩ": (12e6, "m read as mega"),
     "0": (0.0, "short circuit, or a reading below"),
-    "0.00": (0.0, "short circuit"),
     "0.27": (0.27, "a k lost?"),
-    "0.999": (0.999, "a k lost?"),
-    "-3": (-3.0, "below 0"),
     "\u22123": (-3.0, "below 0"),
     "1,300": (1.3, "thousands would be 1300 ohm"),
     "O.L": (OVERLOAD, "taken for overload"),
-    "0L": (OVERLOAD, "taken for overload"),
-    "overload": (OVERLOAD, "taken for overload"),
     ">50M": (OVERLOAD, "taken for overload"),
-    "inf": (OVERLOAD, "taken for overload"),
     "∞": (OVERLOAD, "taken for overload"),
 }
 NONE = [

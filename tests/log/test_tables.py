@@ -72,27 +72,19 @@ def test_blank_cells_are_missing_and_doubtful(take, log):
 
 WRONG = {
     "empty": (b"", "t.csv' is empty; expected a table as CSV"),
-    "blank": (b"\n\n", "expected a header"),
     "header alone": (HEAD, "no rows below the header"),
     "no specimen": ("y,z\n1,2\n", "row 1: no column specimen among 'y, z'; name it, as --column specimen=NAME"),
     "no value": ("specimen,x\n23 triX,2\n", "row 1: no column y or z"),
     "column twice": ("specimen,y,y\n23 triX,2,3\n", "row 1: column 'y' stands twice"),
     "short row": (HEAD + "23 triX,1,2,\n23 triX,1\n", "row 3: 2 cells, but the header has 4"),
-    "long row": (HEAD + "23 triX,0,65k,40,x\n", "row 2: 5 cells"),
     "open quote": (HEAD + '23 triX,"1,2\n', "row 2: this is no row of a CSV file"),
     "bad value": (HEAD + "23 triX,1,2,\n23 triX,1,about 2,\n", "row 3: resistance in Z: 'about 2' is no resistance"),
     "bad name": (HEAD + "23 triX,1,2,\n\n23 trj,1,2,\n", "row 4: '23 trj' is no specimen's name"),
     "bad state": ("specimen,y,baked\n23 triX,1,half\n", "row 2: column baked: 'half'; expected yes, no or nothing"),
     "zip": (b"PK\x03\x04" + b"\0" * 99, "is a zip archive, as .xlsx and .npz are; expected a table as CSV"),
-    "pickle": (pickle.dumps({"specimen": 1}), "is a Python pickle"),
-    "gzip": (b"\x1f\x8b\x08\0", "is packed with gzip"),
-    "utf-16": (HEAD.encode("utf-16"), "is UTF-16"),
     "latin-1": (f"{HEAD}23 triX,1,2,gr\xf6\xdfe\n".encode("latin-1"), "row 2, character 15: byte 0xf6 is not UTF-8"),
     "zero byte": (HEAD + "23 triX,1,2,\0\n", "row 2: a zero byte"),
-    "zero byte elsewhere": ("specimen,y,who\n23 triX,1,\0\n", "row 2: a zero byte"),
-    "huge cell": (HEAD + "23 triX,1,2," + "x" * 200_000 + "\n", "row 2: this is no row of a CSV file (field larger"),
     "long remark": (HEAD + "23 triX,1,2," + "x" * 20_000 + "\n", "row 2: a remark of 20000 characters"),
-    "long name": (HEAD + "23 triX" + "x" * 9_000 + ",1,2,\n", "row 2:"),
 }
 
 
@@ -120,7 +112,7 @@ def test_a_huge_table_is_refused_unread(log, tmp_path, monkeypatch):
         exchange.import_file(log, tmp_path / "big.csv", {})
 
 
-@pytest.mark.parametrize("place", ["none.csv", "/dev/zero", "/dev/tty", "none.json", "none.parquet", "none", "a\0b"])
+@pytest.mark.parametrize("place", ["none.csv", "/dev/zero", "none.json", "none.parquet", "a\0b"])
 def test_what_is_no_file(log, tmp_path, place):
     with pytest.raises(SensorgenError, match=r"cannot read|no file|no Parquet file"):
         exchange.import_file(log, tmp_path / place, {})

@@ -5,16 +5,12 @@ import pickle
 import sys
 import zipfile
 
-import made
 import numpy as np
 import pytest
-import scipy.io as sio
 from made import read_all
 
-from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.core.errors import BadInput
 from sensorgen.measure.recording import rig
-
-RUN = made.run(made.presses(1))
 
 
 class Bomb:
@@ -28,7 +24,7 @@ def test_pickles_archives_and_other_files_are_named_and_not_opened(tmp_path):
     np.save(tmp_path / "objects.npy", np.array([Bomb()], object), allow_pickle=True)
     np.savez(tmp_path / "table.npz", a=np.ones(3))
     (tmp_path / "gz").write_bytes(gzip.compress(b"x" * 100))
-    for protocol in range(6):
+    for protocol in (0, 2, 5):
         (tmp_path / f"pickle{protocol}").write_bytes(pickle.dumps(Bomb(), protocol))
     (tmp_path / "empty").write_bytes(b"")
     (tmp_path / "random").write_bytes(np.random.default_rng(0).bytes(4000))
@@ -50,74 +46,6 @@ def test_pickles_archives_and_other_files_are_named_and_not_opened(tmp_path):
         read_all(tmp_path / "none")
     with pytest.raises(BadInput, match="cannot read"):
         read_all(tmp_path / "a\0b")
-
-
-def mutated(content, rng):
-    """Bytes cut, changed, doubled or removed."""
-    found = bytearray(content)
-    for _ in range(rng.integers(1, 5)):
-        at, what = int(rng.integers(len(found))), rng.integers(5)
-        if what == 0:
-            del found[at:]
-        elif what == 1:
-            found[at] = rng.integers(256)
-        elif what == 2:
-            found[at : at + 4] = rng.bytes(4)
-        elif what == 3:
-            del found[at : at + int(rng.integers(1, 40))]
-        else:
-            found[at:at] = found[at : at + int(rng.integers(1, 40))]
-        if not found:
-            break
-    return bytes(found)
-
-
-@pytest.mark.parametrize(("suffix", "count"), [("mat", 500), ("packed.mat", 150), ("h5", 200), ("csv", 250)])
-def test_damaged_recordings_end_in_a_word_or_a_recording(tmp_path, suffix, count):
-    rng = np.random.default_rng(7)
-    z, t = RUN.impedance_ohm[:40, :2], RUN.time_s[:40]
-    whole = tmp_path / f"whole.{suffix}"
-    tree = made.tree([z], [t], made.stamps(t), (made.TONES_HZ[:2],))
-    if suffix.endswith("mat"):
-        sio.savemat(whole, tree, do_compression=suffix.startswith("packed"))
-    elif suffix == "h5":
-        import h5py
-
-        with h5py.File(whole, "w") as file:
-            file["impedance_data/lockin1"], file["impedance_time"] = z, t
-            file["settings/dem_freqs"] = made.TONES_HZ[:2]
-    else:
-        rows = [f"{a:.5f},{b[0].real:.6g},{b[0].imag:.6g}" for a, b in zip(t, z, strict=True)]
-        whole.write_text("time_s,re_ohm_1kHz,im_ohm_1kHz\n" + "\n".join(rows) + "\n")
-    read_all(whole)
-    content, file = whole.read_bytes(), tmp_path / f"damaged.{suffix}"
-    refused, said = 0, set()
-    for _ in range(count):
-        file.write_bytes(mutated(content, rng))
-        try:
-            for one in read_all(file):
-                assert (np.diff(one.time_s) > 0).all()
-                assert one.impedance_ohm.shape == (len(one.time_s), len(one.tones_hz))
-        except SensorgenError as error:
-            refused += 1
-            said.add("damaged." in str(error))
-    assert refused > count / 10
-    assert said == {True}
-
-
-def test_damaged_logs_of_the_rig_end_in_a_word_or_a_log(tmp_path):
-    rng = np.random.default_rng(8)
-    columns = [c[:50] for c in made.rig_rows(made.presses(1))]
-    content = made.write_rig(tmp_path / "rig.csv", columns).read_bytes()
-    said = set()
-    for _ in range(300):
-        (tmp_path / "damaged.csv").write_bytes(mutated(content, rng))
-        try:
-            found = rig(tmp_path / "damaged.csv")
-            assert len(found.time_s) == len(found.error)
-        except SensorgenError as error:
-            said.add("damaged.csv" in str(error))
-    assert said == {True}
 
 
 def test_files_beyond_what_fits_into_memory_are_not_read(tmp_path, monkeypatch):
