@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "models"))
 
 import virtual_lab
 
+from sensorgen.analysis.characterise import Meters
 from sensorgen.analysis.characterise import posterior as posteriors
-from sensorgen.analysis.characterise.catalogue import Meters
 from sensorgen.analysis.characterise.posterior import posterior
 from sensorgen.workflows.characterise import HOURS, MOST, Study, named
 

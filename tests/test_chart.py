@@ -23,11 +23,11 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError, UnknownName
 from sensorgen.models import fem3d
 from sensorgen.verification import apart, peers
-from sensorgen.verification.chart import cells, elastic, lines, networks, presses, results, scenes, whole
+from sensorgen.verification.chart import cells, elastic, lines, networks, presses, results, scenes
 from sensorgen.verification.chart import plot as pictures
 from sensorgen.verification.chart.cells import STANDARD
-from sensorgen.verification.chart.question import of_scene, own
-from sensorgen.verification.chart_command import command
+from sensorgen.verification.chart.results import of_scene, own
+from sensorgen.verification.commands import chart_command as command
 
 REFERENCE = Path(__file__).parent / "reference"
 
@@ -357,11 +357,11 @@ def test_networks():
 
 def test_a_printed_electrode_is_that_of_the_reference():
     known = json.loads((REFERENCE / "asprinted.json").read_text("utf-8"))["electrode_ratio"]
-    standard = networks.STANDARD["printed electrode, 1e-4 ohm m²"]()
-    assert standard.known.tolist() == [known["90"][known["contact_ohm_m2"].index(1e-4)]]
+    (standard,) = scenes.SCENES["printed electrode, 1e-4 ohm m²"]().references
+    assert standard.value == (known["90"][known["contact_ohm_m2"].index(1e-4)],)
     found, _ = by_model("printed electrode, 1e-4 ohm m²")
     assert found["traxels"].error == 0.05  # no less than the reference's own
-    assert float(found["traxels"].value) == pytest.approx(standard.known[0], rel=0.02)
+    assert float(found["traxels"].value) == pytest.approx(standard.value[0], rel=0.02)
 
 
 def test_every_model_is_on_the_chart():
@@ -397,8 +397,8 @@ def test_every_scene_has_a_question_and_reasons(name):
     assert question.key == name
     assert question.references
     kinds = cells.STANDARD, presses.STANDARD, elastic.BLOCKS, elastic.MEMBRANE, elastic.ROUND, lines.STANDARD
-    kinds += lines.INVERSION, networks.STANDARD, whole.STANDARD
-    assert len(scenes.SCENES) == sum(map(len, kinds))
+    kinds += lines.INVERSION, networks.STANDARD
+    assert len(scenes.SCENES) == sum(map(len, kinds)) + 1  # a whole prediction
 
 
 def test_what_is_known_of_presses(monkeypatch):

@@ -25,7 +25,7 @@ from sensorgen.solvers.line.inputs import read
 from sensorgen.verification import line_models, peers
 from sensorgen.verification.apart import apart, measured
 from sensorgen.verification.chart import cells, design, lines, works
-from sensorgen.verification.chart_command import command
+from sensorgen.verification.commands import chart_command as command
 from sensorgen.verification.peers import cells as geometry
 
 EPS = {"x60": 4.68, "air": 1.0}

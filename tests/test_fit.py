@@ -17,7 +17,17 @@ from no_numbers import roughly_at_rest
 from sensorgen.analysis.comparison import AllowedValues
 from sensorgen.analysis.comparison.expected import Movable
 from sensorgen.analysis.fit import fit, held_back
-from sensorgen.analysis.fit.estimates import Fit, Fitted, OfSpecimen, Untold, _together, leak, resistivity, text, values
+from sensorgen.analysis.fit.estimates import (
+    Fit,
+    Fitted,
+    OfSpecimen,
+    Untold,
+    _of_prints,
+    leak,
+    resistivity,
+    text,
+    values,
+)
 from sensorgen.cli import cli
 from sensorgen.core.document import text as document_text
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
@@ -311,11 +321,11 @@ def test_a_leak_that_the_design_sets_itself():
 
 def test_few_prints_are_less_sure_than_their_scatter():
     """Student, with a prior of 10 % that is worth three prints; one print is never the material."""
-    mean, error = _together([(1.0, 1e-9), (1.2, 1e-9)], ["a", "b"])
+    mean, error = _of_prints([("a", (1.0, 1e-9)), ("b", (1.2, 1e-9))])
     scatter = ((3 * 0.1**2 + 2 * 0.1**2) / 4) ** 0.5
     assert (mean, 2 * error) == (pytest.approx(1.1), pytest.approx(stats.t.ppf(0.975, 4) * scatter * 1.5**0.5))
-    assert _together([(1.0, 0.3), (1.0, 0.4)], ["a", "b"]) == (1.0, pytest.approx(0.25))
-    assert _together([(1.0, 1e-9)], ["a"]) == (1.0, pytest.approx(stats.t.ppf(0.975, 3) * 0.1 / 2**0.5))
+    assert _of_prints([("a", (1.0, 0.3)), ("b", (1.0, 0.4))]) == (1.0, pytest.approx(0.25))
+    assert _of_prints([("a", (1.0, 1e-9))]) == (1.0, pytest.approx(stats.t.ppf(0.975, 3) * 0.1 / 2**0.5))
 
 
 def test_an_interval_holds_95_of_100_further_prints():
@@ -323,16 +333,16 @@ def test_an_interval_holds_95_of_100_further_prints():
     rng, inside = np.random.default_rng(2), []
     for _ in range(600):
         *eight, ninth = 0.15 * rng.standard_normal(9)
-        mean, error = _together([(at + 0.04 * rng.standard_normal(), 0.04) for at in eight], list("abcdefgh"))
+        mean, error = _of_prints((at, (at + 0.04 * rng.standard_normal(), 0.04)) for at in eight)
         inside.append(abs(ninth - mean) < 2 * error)
     assert 0.92 < np.mean(inside) < 0.98
 
 
 def test_specimens_of_one_plate_are_one_print():
     pairs = [(1.0, 1e-9), (1.2, 1e-9), (1.1, 1e-9)]
-    one_plate = _together(pairs, ["plate"] * 3)
-    assert one_plate == (pytest.approx(1.1), pytest.approx(_together([(1.1, 1e-9)], ["a"])[1]))
-    assert _together(pairs, ["a", "b", "c"])[1] < one_plate[1]
+    one_plate = _of_prints(("plate", pair) for pair in pairs)
+    assert one_plate == (pytest.approx(1.1), pytest.approx(_of_prints([("a", (1.1, 1e-9))])[1]))
+    assert _of_prints(zip("abc", pairs, strict=True))[1] < one_plate[1]
 
 
 PILLARS = "shape: pillar\nname: pillars\nparameters: {length_mm: 20, width_mm: 5}\n"

@@ -13,9 +13,9 @@ import pytest
 from drawn_sensor import sensor_of
 from line_cases import PLATE
 
-from sensorgen.analysis import plots
 from sensorgen.analysis.plots import figure as figure_data
 from sensorgen.analysis.plots import pages, static
+from sensorgen.analysis.plots import results as plots
 from sensorgen.analysis.plots.figure import Map, frequency, scale
 from sensorgen.analysis.plots.results import (
     LARGEST,

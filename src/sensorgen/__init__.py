@@ -30,25 +30,7 @@ if TYPE_CHECKING:
     from sensorgen.prediction.query import Query as Query
     from sensorgen.prediction.query import Tip as Tip
     from sensorgen.prediction.results import Prediction as Prediction
-    from sensorgen.workflows.api import as_printed as as_printed
-    from sensorgen.workflows.api import batch as batch
-    from sensorgen.workflows.api import build as build
-    from sensorgen.workflows.api import calibrate as calibrate
-    from sensorgen.workflows.api import cell as cell
-    from sensorgen.workflows.api import characterise as characterise
-    from sensorgen.workflows.api import check as check
-    from sensorgen.workflows.api import compare as compare
-    from sensorgen.workflows.api import compress as compress
-    from sensorgen.workflows.api import export_design as export_design
-    from sensorgen.workflows.api import fit as fit
-    from sensorgen.workflows.api import invert as invert
-    from sensorgen.workflows.api import load as load
-    from sensorgen.workflows.api import optimise as optimise
-    from sensorgen.workflows.api import predict as predict
-    from sensorgen.workflows.api import report as report
-    from sensorgen.workflows.api import show as show
-    from sensorgen.workflows.api import slice_design as slice_design
-    from sensorgen.workflows.api import sweep as sweep
+    from sensorgen.workflows.api import *  # noqa: F403 - all functions there, by the names below
 
 _TYPES = {
     "Body": "design.body",

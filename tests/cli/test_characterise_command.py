@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import virtual_lab
 
+from sensorgen.analysis.characterise import Meters
 from sensorgen.analysis.characterise import posterior as posteriors
-from sensorgen.analysis.characterise.catalogue import Meters
 from sensorgen.design.design import make
 from sensorgen.design.values import resistivities, spread
 from sensorgen.workflows.characterise import Study, _line_width, plan, read

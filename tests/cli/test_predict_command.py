@@ -8,7 +8,7 @@ import math
 import pytest
 from line_cases import PLATE as LINE_PLATE
 
-from sensorgen.analysis import plots
+from sensorgen.analysis.plots import results as plots
 from sensorgen.models import line
 
 pytestmark = pytest.mark.usefixtures("shared_cache")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import virtual_lab
 
-from sensorgen.analysis.characterise.catalogue import UPPER_MM
+from sensorgen.analysis.characterise import UPPER_MM
 from sensorgen.models import coupons
 
 LINE = virtual_lab.LINE_MM

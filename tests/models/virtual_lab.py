@@ -14,7 +14,7 @@ import numpy as np
 from resistors import potentials
 from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 
-from sensorgen.analysis.characterise import catalogue
+from sensorgen.analysis import characterise as catalogue
 from sensorgen.analysis.characterise.posterior import Observation
 from sensorgen.models import traxels
 from sensorgen.solvers.network import StraightLines

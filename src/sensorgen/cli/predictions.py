@@ -138,7 +138,7 @@ def _deliver(result: Any, *, detailed: bool, explain: bool) -> None:
 
 
 def _plot(result: "Loaded", folder: Path) -> None:
-    from sensorgen.analysis import plots
+    from sensorgen.analysis.plots import results as plots
     from sensorgen.core import files
 
     with render.progress(plots.STEPS) as step:

@@ -164,14 +164,12 @@ def ngspice(given: PressedLine, cells: int) -> Complex:
 _DIGITS = 220
 _LARGEST = 1e4  # of abs(z^2): cosh z then has 43 digits before the point
 
-Number = tuple[Decimal, Decimal]  # real and imaginary part
-
 
 def exact_impedance(r_ohm_per_m: Sequence[float], y_s_per_m: Sequence[complex], length_m: Sequence[float]) -> complex:
-    r"""Of sections from the contacts to the open far end [ohm], in 220 digits: chain matrices by Taylor series.
+    r"""Of sections from the contacts to the open far end [ohm], in 220 digits: Taylor series of chain matrices.
 
-    .. math:: \begin{pmatrix} \cosh z & rl \, \sinh z / z \\ y l \, \sinh z / z & \cosh z \end{pmatrix},
-              \quad z^2 = r y l^2
+    .. math:: \begin{pmatrix} U \\ I \end{pmatrix} \to \exp\left[l \begin{pmatrix} 0 & r \\ y & 0 \end{pmatrix}\right]
+              \begin{pmatrix} U \\ I \end{pmatrix}
 
     Independent of all models of lines, and exact to the last digit of what it is rounded to.
 
@@ -192,39 +190,18 @@ def exact_impedance(r_ohm_per_m: Sequence[float], y_s_per_m: Sequence[complex], 
     """
     with localcontext() as context:
         context.prec = _DIGITS
-        voltage: Number = (Decimal(1), Decimal(0))
-        current: Number = (Decimal(0), Decimal(0))
+        least = Decimal(10) ** -(_DIGITS - 20)
+        state = np.array([Decimal(1), Decimal(0), Decimal(0), Decimal(0)])  # U, I: real and imaginary parts
         for r, y, length in reversed(list(zip(r_ohm_per_m, y_s_per_m, length_m, strict=True))):
-            series = (Decimal(r) * Decimal(length), Decimal(0))
-            shunt = (Decimal(y.real) * Decimal(length), Decimal(y.imag) * Decimal(length))
-            square = _times(series, shunt)
-            if abs(complex(*map(float, square))) > _LARGEST:
-                raise OutOfRange(f"a section of the line is {abs(complex(*map(float, square))) ** 0.5:.3g} long")
-            cosh, sinhc = _series(square, 0), _series(square, 1)
-            voltage, current = (
-                _plus(_times(cosh, voltage), _times(_times(series, sinhc), current)),
-                _plus(_times(_times(shunt, sinhc), voltage), _times(cosh, current)),
-            )
-        size = current[0] * current[0] + current[1] * current[1]
-        impedance = _times(voltage, (current[0] / size, -current[1] / size))
-        return complex(float(impedance[0]), float(impedance[1]))
-
-
-def _times(a: Number, b: Number) -> Number:
-    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
-
-
-def _plus(a: Number, b: Number) -> Number:
-    return a[0] + b[0], a[1] + b[1]
-
-
-def _series(square: Number, odd: int) -> Number:
-    """Sum of square^k / (2 k + odd)!: cosh z, or sinh z / z."""
-    term: Number = (Decimal(1), Decimal(0))
-    total, k, least = term, 0, Decimal(10) ** -(_DIGITS - 20)
-    while abs(term[0]) + abs(term[1]) > least:
-        k += 1
-        below = Decimal((2 * k + odd) * (2 * k + odd - 1))
-        term = _times(term, (square[0] / below, square[1] / below))
-        total = _plus(total, term)
-    return total
+            if abs(square := r * y * length**2) > _LARGEST:
+                raise OutOfRange(f"a section of the line is {abs(square) ** 0.5:.3g} long")
+            rows = [[0, 0, r, 0], [0, 0, 0, r], [y.real, -y.imag, 0, 0], [y.imag, y.real, 0, 0]]
+            matrix = np.array([[Decimal(value) * Decimal(length) for value in row] for row in rows])
+            term, k = state, 0
+            while max(abs(term)) > least:
+                k += 1
+                term = matrix @ term / k
+                state = state + term
+        (u_re, u_im), (i_re, i_im) = state.reshape(2, 2)
+        size = i_re * i_re + i_im * i_im
+        return complex(float((u_re * i_re + u_im * i_im) / size), float((u_im * i_re - u_re * i_im) / size))

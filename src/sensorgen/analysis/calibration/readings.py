@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.analysis.comparison import AllowedValues, Comparison, allowed, of_iteration
+from sensorgen.analysis.comparison import Comparison, allowed, of_iteration
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.core.units import M_PER_MM
@@ -162,23 +162,20 @@ def readings_of(
     state = logged[-1].baked
     counted = [one for one in logged if one.baked == state]
     comparison = of_iteration(log, None, body_of=body_of, specimens=[name])
-    ranges = _allowed(comparison, counted)
     left_out = list[str]()
     measured = [each for one in counted for each in _alternating(one, left_out)]
-    return _meter(measured, _ln_resistance(ranges, resistivity_ohm_m)), counted, left_out
+    return _meter(measured, _ln_resistance(comparison, counted, resistivity_ohm_m)), counted, left_out
 
 
-def _allowed(comparison: Comparison, readings: Sequence[Reading]) -> list[AllowedValues]:
-    """Resistivities that readings allow."""
+def _ln_resistance(
+    comparison: Comparison, readings: Sequence[Reading], resistivity_ohm_m: float
+) -> tuple[float, float] | None:
+    """Mean of ln of the resistivities that readings allow over the predicted one, and its standard deviation."""
     numbers = {one.number for one in readings}
-    return [
+    ranges = [
         each for row in comparison.direct if row.predicted and row.reading.number in numbers
         and (each := allowed(row, comparison.bodies[row.predicted.design]))
     ]  # fmt: skip
-
-
-def _ln_resistance(ranges: Sequence[AllowedValues], resistivity_ohm_m: float) -> tuple[float, float] | None:
-    """Mean of ln of resistivities over the predicted one, and its standard deviation."""
     if not ranges:
         return None
     low, high = (float(np.mean([getattr(each, end) for each in ranges])) for end in ("low", "high"))

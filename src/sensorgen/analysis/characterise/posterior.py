@@ -13,7 +13,7 @@ from math import log
 
 import numpy as np
 
-from sensorgen.analysis.characterise.catalogue import LEVEL_SIGMA, Coupon, CouponSize, CouponTarget, Meters, nominal
+from sensorgen.analysis.characterise import LEVEL_SIGMA, Coupon, CouponSize, CouponTarget, Meters, nominal
 from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.prediction.inference import Index, LeastSquares, LocalFit, Normal, Parameter, descend, whitening

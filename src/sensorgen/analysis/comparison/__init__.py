@@ -439,8 +439,3 @@ def _per_resistivity(body: Body) -> list[Bounds]:
         Bounds.of(r.value, r.unit, model=r.model, print=r.print).times(1 / rho[end].value, "1/m")
         for end, r in electrode_resistance(body).items()
     ]
-
-
-def known_iterations(log: Log) -> list[int]:
-    """Iterations that the log knows specimens of."""
-    return sorted({s.iteration for s in log.specimens() if s.iteration is not None})

@@ -3,7 +3,7 @@
 Specimens are held back: the values come from the others, and the errors before and after are of those held back.
 """
 
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from itertools import chain
@@ -186,19 +186,15 @@ def _fitted(
         if isinstance(one, Fitted):
             before = best.get((one.material, one.quantity), one)
             best[one.material, one.quantity] = min(one, before, key=lambda value: value.high / value.low)
-    open_ = {u.parameter: u for u in reversed(results) if isinstance(u, Untold) and not _is_told(u, best)}
-    return list(best.values()), [_ACROSS, *open_.values()]
+    open_ = {u.parameter: u for u in reversed(results) if isinstance(u, Untold)}
+    told = {name for name in open_ if any(quantity.startswith(name.split()[0]) for _, quantity in best)}
+    return list(best.values()), [_ACROSS, *(u for name, u in open_.items() if name not in told)]
 
 
 def _electrodes(comparison: Comparison) -> list[str]:
     """Materials of all electrodes."""
     parts = ("top_electrode", "bottom_electrode")
     return sorted({body.design.slot(part)[0].name for body in comparison.bodies.values() for part in parts})
-
-
-def _is_told(untold: Untold, values: Iterable[tuple[str, str]]) -> bool:
-    """Test whether a value of this quantity was found by other data."""
-    return any(quantity.startswith(untold.parameter.split()[0]) for _, quantity in values)
 
 
 def with_values(body: Body, values: Sequence[Fitted]) -> Body:

@@ -5,7 +5,7 @@ counts. A result holds values with their uncertainty, what the data do not deter
 """
 
 import re
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from math import exp, inf, isnan, log, pi, sqrt
@@ -256,7 +256,7 @@ def by_group(groups: Mapping[str, Sequence[tuple[AllowedValues, bool]]], materia
 
 
 def _medians(values: Real, seed: int) -> Real:
-    """Medians of n specimens drawn from n again and again (bootstrap), column by column.
+    """Medians of n values drawn from n again and again (bootstrap).
 
     Which of the sorted specimens is the median of a draw is drawn itself: the k-th of n even random numbers follows
     a beta distribution, and the one after it is the least of the n - k that are larger.
@@ -265,7 +265,7 @@ def _medians(values: Real, seed: int) -> Real:
     lower = rng.beta((count + 1) // 2, count - (count + 1) // 2 + 1, _DRAWS)
     upper = lower if count % 2 else lower + (1 - lower) * rng.beta(1, count // 2, _DRAWS)
     ranks = [np.minimum((u * count).astype(np.intp), count - 1) for u in (lower, upper)]
-    ordered = np.sort(values, axis=0)
+    ordered = np.sort(values)
     return np.asarray((ordered[ranks[0]] + ordered[ranks[1]]) / 2)
 
 
@@ -284,7 +284,7 @@ def leak(readings: Sequence[AllowedValues], material: str, seed: int) -> Fitted 
             f"{len(known)} specimens leak, if evenly, by {least:.2g} to {most:.2g} S/m2, median {np.exp(middle):.2g}; "
             f"half of them by more than {spread:.3g} times more or less: single bridges, and no property of {material}",
         )
-    outer = np.percentile(_medians(known[:, None], seed)[:, 0], 100 * np.array([(1 - LEVEL) / 2, (1 + LEVEL) / 2]))
+    outer = np.percentile(_medians(known, seed), 100 * np.array([(1 - LEVEL) / 2, (1 + LEVEL) / 2]))
     return Fitted(
         material, FILM_LEAK, exp(middle), exp(outer[0]), exp(outer[1]),
         f"R_Z of {len(known)} specimens, taken to leak evenly",
@@ -407,7 +407,7 @@ def _specimens(count: int) -> str:
 
 def _modulus(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
     pressed = [
-        (fit, (at + log(t.value), error)) for fit, at, error in _sure(fits, "stiffness")
+        (fit.print_, (at + log(t.value), error)) for fit, at, error in _sure(fits, "stiffness")
         for t in fit.of.model.values if t.material == film and t.quantity == MODULUS
     ]  # fmt: skip
     if not pressed:
@@ -415,28 +415,20 @@ def _modulus(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
         none = "no recording with three presses whose force and position are known"
         return Untold(MODULUS, "known presses do not determine it" if known else none)
     law = f"by the law of compression {fits[0].of.model.sensor.compression.name}; all moduli move together"
-    return _value(
-        film, MODULUS, _of_prints(pressed), f"presses of {_specimens(len(pressed))}, {law}", len(pressed)
-    )  # fmt: skip
+    note = f"presses of {_specimens(len(pressed))}, {law}"
+    return _value(film, MODULUS, _of_prints(pressed), note, len(pressed))
 
 
-def _of_prints(pairs: Sequence[tuple[OfSpecimen, Estimate]], usual: float = _BETWEEN) -> Estimate:
-    """Mean of specimens' estimates over their prints, and the error of it for one more print."""
-    return _together([estimate for _, estimate in pairs], [fit.print_ for fit, _ in pairs], usual)
-
-
-def _together(estimates: Sequence[Estimate], prints: Sequence[str], usual: float = _BETWEEN) -> Estimate:
+def _of_prints(pairs: Iterable[tuple[str, Estimate]], usual: float = _BETWEEN) -> Estimate:
     """Mean over prints, and its error for one more print: by the errors or by the scatter of prints, whichever is more.
 
-    Specimens of one plate count as one print: they share its conditions. Few
-    prints tell their own scatter badly: a prior stands in for it, and it counts as much more as Student's interval is
-    wider. One print alone therefore never gives its own value for the material's.
+    Specimens of one plate count as one print: they share its conditions. Few prints tell their own scatter badly: a
+    prior stands in for it, and it counts as much more as Student's interval is wider. One print alone therefore never
+    gives its own value for the material's.
     """
     from scipy.special import stdtrit
 
-    of = {name: [pair for pair, print_ in zip(estimates, prints, strict=True) if print_ == name] for name in prints}
-    means = np.array([np.mean(pairs, axis=0) for pairs in of.values()])
-    at, errors = means.T
+    at, errors = np.array([np.mean(estimates, axis=0) for estimates in by_key(pairs).values()]).T
     own, count = sqrt(float((errors**2).sum())) / len(at), len(at)
     degrees = _WEIGHT + count - 1
     scatter = sqrt((_WEIGHT * usual**2 + float(((at - at.mean()) ** 2).sum())) / degrees)
@@ -445,7 +437,7 @@ def _together(estimates: Sequence[Estimate], prints: Sequence[str], usual: float
 
 
 def _permittivity(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
-    pairs, open_ = list[tuple[OfSpecimen, Estimate]](), 0.0
+    pairs, open_ = list[tuple[str, Estimate]](), 0.0
     for fit, ln_c, error in _sure(fits, "capacitance"):
         factor, curve = fit.of.by_permittivity
         if not curve[0] <= ln_c <= curve[-1]:
@@ -458,7 +450,7 @@ def _permittivity(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
         slope, at = (float(np.interp(ln_c, curve, of)) for of in (np.gradient(curve, factor), factor))
         c = fit.of.model.rest.capacitance  # what model and print leave open
         open_ = max(open_, log(c.model.upper / c.model.lower * c.print.upper / c.print.lower) / 2 / _SURE / slope)
-        pairs.append((fit, (log(fit.of.permittivity) + at, error / slope)))
+        pairs.append((fit.print_, (log(fit.of.permittivity) + at, error / slope)))
     if not pairs:
         return Untold(PERMITTIVITY, "no reading of a specimen depends on it")
     at, between = _of_prints(pairs)
@@ -470,7 +462,9 @@ def _permittivity(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
 def _leak(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
     """Per area, where it stands out of its error in every recording."""
     areas = [fit.of.model.sensor.length_m * fit.of.model.sensor.width_m for fit in fits]
-    pairs = [(fit, (fit.leak_s[0] / a, fit.leak_s[1] / a)) for fit, a in zip(fits, areas, strict=True) if fit.leak_s]
+    pairs = [
+        (fit.print_, (fit.leak_s[0] / a, fit.leak_s[1] / a)) for fit, a in zip(fits, areas, strict=True) if fit.leak_s
+    ]
     if not pairs:
         return Untold("leak", "no reading of a specimen depends on it")
     count = _specimens(len(pairs))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sensorgen.analysis.plots import pages, static
 from sensorgen.analysis.plots.figure import (
     BLUE,
     COLOURS,
@@ -24,6 +25,7 @@ from sensorgen.analysis.plots.figure import (
     Values,
     frequency,
     look,
+    needed,
     scale,
 )
 from sensorgen.checks.review import Review
@@ -529,7 +531,47 @@ def inverse(of: ResponseMap, which: str) -> Figure:
     return Figure.by_frequency(f"inverse-{which}", title, alt, of.frequency_hz, panels, columns=4)
 
 
+PAGE = "predict.html"
+STEPS = ("identifiability.png", *(f"{name}.png" for name in QUANTITIES), "inverse-position.png", "inverse-force.png",
+         PAGE)  # fmt: skip
+
+
 def figures(of: ResponseMap) -> Iterator[Figure]:
     """All of them: quantities, then the inverse maps."""
     yield from (quantity(of, name) for name in QUANTITIES)
     yield from (inverse(of, which) for which in ("position", "force"))
+
+
+def files(
+    sensor: Sensor, frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float],
+    title: str = "",
+) -> Iterator[tuple[str, bytes]]:  # fmt: skip
+    """All pictures of a sensor under load, by file name, in the order of ``STEPS``.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Under load.
+    frequency_hz, force_n, position_mm : sequence of float
+        Frequencies [Hz], forces [N] and centres of the tip [mm], each rising; at least two forces and two positions.
+    title : str
+        Name of the design.
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`response`.
+    MissingValue
+        Matplotlib or Plotly is not installed.
+    """
+    needed("matplotlib", "plotly")
+    answer = response(sensor, frequency_hz, force_n, position_mm)
+    drawn = [identifiability_figure(sensor, frequency_hz, force_n=force_n[-1], title=title), *figures(answer)]
+    for figure in drawn:
+        yield f"{figure.key}.png", static.png(figure)
+    words = (
+        f"{len(frequency_hz)} frequencies, {force_n[0]:g} to {force_n[-1]:g} N, "
+        f"{position_mm[0]:g} to {position_mm[-1]:g} mm, tip {sensor.tip_m / M_PER_MM:g} mm."
+    )
+    sections = [pages.PageSection(figures=tuple(drawn))]
+    yield PAGE, pages.page(f"{title or 'Sensor'} under load", [words], sections).encode()

@@ -14,7 +14,7 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sensorgen.analysis.comparison import UNTRUSTED, Comparison, known_iterations, of_iteration
+from sensorgen.analysis.comparison import UNTRUSTED, Comparison, of_iteration
 from sensorgen.analysis.comparison.measured import RecordedRun, runs
 from sensorgen.analysis.plots import pages
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, BodyTriangles, Curve, Figure, Panel
@@ -97,14 +97,6 @@ def _sources(comparison: Comparison) -> list[Origin]:
 
 
 STEPS = ("readings", "recordings", "residuals", "variants", "page")
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """Something that could not be used, and the reason."""
-
-    what: Annotated[str, Column("what")]
-    why: Annotated[str, Column("why")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,7 +259,8 @@ def _basis(comparison: Comparison, recorded: Sequence[RecordedRun]) -> Iterator[
 
 
 def _nothing(log: Log, of: str, left_out: Sequence[tuple[str, str]]) -> BadInput:
-    known = ", ".join(map(str, known_iterations(log))) or "none"
+    iterations = sorted({s.iteration for s in log.specimens() if s.iteration is not None})
+    known = ", ".join(map(str, iterations)) or "none"
     lost = "; ".join(f"{what}: {why}" for what, why in left_out)
     return BadInput(
         f"the log has no readings of {of}{f' ({lost})' if lost else ''}; iterations in it: {known}. "
@@ -301,8 +294,8 @@ def _sections(log: Log, data: _ReportData) -> Iterator[PageSection]:
     yield PageSection("recorded", "Recordings", tuple(recordings.figures(recorded)), recordings.facts(recorded))
     figures = () if brief else tuple(_variants(comparison))
     yield PageSection("variants", "The variants", figures, identifiability(comparison), _drawings(comparison))
-    caption = "What was left out, or taken with care, and why"
-    omitted = Table.some("left_out", caption, [LeftOut(*row) for row in data.left_out])
+    caption, columns = "What was left out, or taken with care, and why", (Column("what"), Column("why"))
+    omitted = (Table("left_out", caption, columns, data.left_out),) if data.left_out else ()
     yield PageSection("left-out", "What was left out, and why", parts=omitted)
     yield PageSection("provenance", "Provenance", parts=(origins(log, comparison, brief=brief),))
 

@@ -4,7 +4,7 @@ from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import isfinite, nan
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.report.alternating import BAKED, F_PER_PF, AcRow, at_text
@@ -124,36 +124,23 @@ def rows(comparison: Comparison, ac: Sequence[AcRow]) -> Lazy[HistoryRow]:
 
 
 def _row(row: Compared, was: Compared | None, pf: dict[float, float], c: _ByFrequency, shrinkage: float) -> HistoryRow:
-    words, change = row.reading.words, _since(row, was, pf, c)
-    lowest, bake = min(change.c, default=None), "" if words.baked is None else BAKED[words.baked]
-    return HistoryRow(
-        row.reading.number, row.reading.specimen, bake, 100 * shrinkage or None, words.defects,
-        words.remark, change.against, change.electrode, change.film, change.c.get(lowest or nan, nan),
-        at_text(lowest) if lowest else "", (1 - shrinkage) ** 2 if change.baked and shrinkage else None,
-        row.verdict.word,
-    )  # fmt: skip
-
-
-class _Change(NamedTuple):
-    """Ratios of electrode, film and C by frequency, to what they are compared with; whether it was baked between."""
-
-    against: str
-    electrode: float
-    film: float
-    c: dict[float, float]
-    baked: bool = False
-
-
-def _since(row: Compared, was: Compared | None, pf: dict[float, float], c: _ByFrequency) -> _Change:
+    """A reading beside the one before it, or beside its prediction where it is the first."""
+    words, now = row.reading.words, row.verdict
     if was is None:
         expected = row.predicted.ry_ohm if row.predicted else None
-        electrode = _ratio(row.verdict.ry_ohm, expected.value if expected else nan)
-        return _Change("prediction", electrode, nan, {f: ratio for f, (_, ratio) in c.items()})
-    now, then = row.verdict, was.verdict
-    baked = bool(was.reading.words.baked is False and row.reading.words.baked)
-    ratios = {f: value / pf[f] for f, (value, _) in c.items() if f in pf}
-    electrode, film = _ratio(now.ry_ohm, then.ry_ohm), _ratio(now.rz_ohm, then.rz_ohm)
-    return _Change(f"reading {was.reading.number}", electrode, film, ratios, baked)
+        against, baked = "prediction", False
+        before_ohm = expected.value if expected else nan, nan
+        ratios = {f: ratio for f, (_, ratio) in c.items()}
+    else:
+        against, baked = f"reading {was.reading.number}", was.reading.words.baked is False and words.baked
+        before_ohm = was.verdict.ry_ohm, was.verdict.rz_ohm
+        ratios = {f: value / pf[f] for f, (value, _) in c.items() if f in pf}
+    lowest, bake = min(ratios, default=None), "" if words.baked is None else BAKED[words.baked]
+    return HistoryRow(
+        row.reading.number, row.reading.specimen, bake, 100 * shrinkage or None, words.defects, words.remark, against,
+        _ratio(now.ry_ohm, before_ohm[0]), _ratio(now.rz_ohm, before_ohm[1]), ratios.get(lowest or nan, nan),
+        at_text(lowest) if lowest else "", (1 - shrinkage) ** 2 if baked and shrinkage else None, now.word,
+    )  # fmt: skip
 
 
 def _ratio(now: float, before: float) -> float:

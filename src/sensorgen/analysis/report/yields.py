@@ -2,12 +2,9 @@
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
-from math import comb, erfc, inf, isfinite, nan, sqrt
+from math import comb, inf, isfinite, nan
 from statistics import geometric_mean, median
 from typing import Annotated
-
-import numpy as np
 
 from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.comparison.measured import Words
@@ -342,12 +339,8 @@ def rank_p(one: Sequence[float], other: Sequence[float]) -> float:
     >>> round(rank_p([0.68, 0.6, 0.63, 0.67, 0.68], [0.36, 0.435, 0.5, 0.5, 0.45]), 6)  # 2 of 252
     0.007937
     """
-    both, n, count = np.array([*one, *other]), len(one), len(one) + len(other)
-    ordered = np.sort(both)
-    ranks = (ordered.searchsorted(both) + ordered.searchsorted(both, "right") - count) / 2  # from their mean
-    score = ranks[:n].sum()
-    if comb(count, n) <= _ORDERS:
-        scores = ranks[np.array([*combinations(range(count), n)])].sum(axis=1)
-        return float(min(1.0, 2 * min((scores <= score).mean(), (scores >= score).mean())))
-    variance = n * (count - n) / (count - 1) * ranks.var()
-    return min(1.0, erfc((abs(score) - 0.5) / sqrt(2 * variance))) if variance else 1.0
+    from scipy.stats import PermutationMethod, mannwhitneyu
+
+    exact = comb(len(one) + len(other), len(one)) <= _ORDERS
+    method = PermutationMethod(n_resamples=_ORDERS) if exact else "asymptotic"
+    return float(mannwhitneyu(one, other, method=method).pvalue)

@@ -20,7 +20,7 @@ from sensorgen.design import design as designs
 from sensorgen.scene.scene import Body, Outline, Prism, Scene, box
 from sensorgen.verification.apart import ModelAnswer
 from sensorgen.verification.chart import design, works
-from sensorgen.verification.chart.question import OWN, Level, Question, Series, of_scene
+from sensorgen.verification.chart.results import OWN, Level, Question, Series, of_scene
 
 PERMITTIVITY = {"air": 1.0, "wall": 1e-10}
 CORNERS = 24  # of a quarter of a circle

@@ -28,18 +28,20 @@ from sensorgen.solvers.line.inputs import PressedLine, read
 from sensorgen.verification import line_models, peers
 from sensorgen.verification.apart import Runner, apart
 from sensorgen.verification.chart import presses, works
-from sensorgen.verification.chart.question import (
+from sensorgen.verification.chart.results import (
     DIGITS,
     OWN,
+    Chart,
     Level,
     Question,
     Reference,
     Series,
     Values,
+    best_of,
+    measured,
     of_line,
     of_modulus,
 )
-from sensorgen.verification.chart.results import Chart, best_of, measured
 
 KEYS = ("capacitance", "compression", "line", "prediction")
 WIDTHS, WIDTHS_IN_3D = (1e-3, 1e-5, 1e-7), (1e-1, 1e-2, 1e-3, 1e-4)  # of the bounds of C, wanted

@@ -9,7 +9,7 @@
   displacement of the sheared edge, by mixed elements of order 6 in another program.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -28,7 +28,7 @@ from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Body, Prism, Scene, box
 from sensorgen.solvers.contact.cell import ContactCell
 from sensorgen.verification.chart.presses import has_mesher
-from sensorgen.verification.chart.question import DIGITS, Ladder, Question, of_scene, own
+from sensorgen.verification.chart.results import DIGITS, Ladder, Question, of_scene, own
 
 _RUBBER = Elastic(6e6, 0.5)
 _STRETCHES = np.array([0.97, 0.9, 0.8])  # along the load, of blocks
@@ -135,7 +135,8 @@ BLOCKS: dict[str, Callable[[], KnownBlock]] = {
 def of_block(name: str) -> Question:
     """Displacement of the top of a body at every load, by every model of compression [m]."""
     standard = BLOCKS[name]()
-    series, asked = own(_models(standard), _refused(standard)), "displacement of the top of a body"
+    refused = _refused(standard)
+    series, asked = own(_models(standard, refused), refused), "displacement of the top of a body"
     return of_scene(name, asked, series, standard.down_m, standard.known_to)
 
 
@@ -154,12 +155,10 @@ def _refused(standard: KnownBlock) -> dict[str, str]:
     return why
 
 
-def _models(standard: KnownBlock) -> Iterator[Ladder]:
+def _models(standard: KnownBlock, refused: Container[str]) -> Iterator[Ladder]:
     """Displacement [m] by laws of plates, by springs, and by finite elements in two and in three dimensions."""
-    refused = _refused(standard)
     for law in standard.laws:
-        work = partial(_by_law, standard, law)
-        yield f"compression: {law.name}", [("", work)]
+        yield f"compression: {law.name}", [("", partial(_by_law, standard, law))]
     if "springs" not in refused:
         moduli = {
             name: s.youngs_modulus_pa / (1 - standard.plane * s.poisson_ratio**2) for name, s in standard.solids.items()
@@ -210,17 +209,9 @@ def of_round(name: str) -> Question:
 
 def _not_for_round(name: str) -> dict[str, str]:
     """Why models of compression do not apply to a round body."""
-    no_film, missing = (
-        "it gives the displacement of the top, and not where bodies touch",
-        "the mesher is not installed (extra fem)",
-    )
-    why = {
-        "press2d": missing,
-        "press_round": missing,
-        "press3d": "a round body is no box",
-        "springs": no_film,
-        "compression": no_film,
-    }
+    why = dict.fromkeys(("press2d", "press_round"), "the mesher is not installed (extra fem)")
+    why |= dict.fromkeys(("springs", "compression"), "it gives the displacement of the top, and not where bodies touch")
+    why["press3d"] = "a round body is no box"
     if name == SPHERE:
         return why | {"press2d": "a sphere is no prism", "pressure": "its contacts are as long as the sensor is wide"}
     return why | {"press_round": "a cylinder that lies has no upright axis"}

@@ -19,7 +19,7 @@ from sensorgen.prediction.inverse.estimator import Estimator
 from sensorgen.solvers.line.inputs import PressedLine
 from sensorgen.verification import line_models, peers
 from sensorgen.verification.chart import design
-from sensorgen.verification.chart.question import DIGITS, OWN, Question, Series, Values, of_line, of_scene, own
+from sensorgen.verification.chart.results import DIGITS, OWN, Question, Series, Values, of_line, of_scene, own
 
 # The plate of Table 3.1, pressed in its middle.
 PLATE = {

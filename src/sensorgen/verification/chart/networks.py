@@ -5,43 +5,23 @@ Lines of a solid plate are laid without a slicer: walls around, infill to and fr
 layer.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from math import cos, log, pi, radians, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.units import M_PER_MM
 from sensorgen.models import conduction, line, sheet, stack, traxels
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.network import StraightLines
 from sensorgen.solvers.sheet.parts import Sheet
-from sensorgen.verification.chart.question import DIGITS, Question, Step, of_line, of_scene, own
+from sensorgen.verification.chart.results import DIGITS, Question, Step, of_line, of_scene, own
 
 Values = NDArray[Any]
-
-
-@dataclass(frozen=True)
-class KnownNetwork:
-    """Values that are known, and the work of each model that gives them.
-
-    Attributes
-    ----------
-    known : array
-        Impedances [ohm], or resistances over those of a solid [-].
-    known_to : float
-        Their relative error [-].
-    models : dict of str to tuple
-        By name: a list of words and works, from coarse to fine.
-    """
-
-    known: Values
-    known_to: float
-    models: dict[str, list[Step]]
 
 
 _TRACKS, _FILMS = (23e3, 67e3, 23e3), (7e-10, 3.5e-10)  # [ohm/m], [F/m]
@@ -67,14 +47,14 @@ _RHO_OHM_M, _CONTACTS_OHM_M2 = 0.2, (1e-6, 1e-4, 1e-2)
 _LINE_MM, _LAYER_MM, _ACROSS = 0.42, 0.1, 12
 
 
-def two_films() -> KnownNetwork:
+def two_films(name: str) -> Question:
     """Two films with a track in common, pressed in their middle; off the diagonal what one film shows of the other."""
     tracks, films = _sections()
     together = partial(stack.impedance, tracks, [list(section.T) for section in films], _LENGTHS_M)
-    return KnownNetwork(_STACK, DIGITS, {"stack": [("", together)], "line: each film alone": [("", _alone)]})
+    return _question(name, _STACK, DIGITS, {"stack": [("", together)], "line: each film alone": [("", _alone)]})
 
 
-def front_edge() -> KnownNetwork:
+def front_edge(name: str) -> Question:
     """A sheet of 100 x 70 mm between two stretches of one edge: its rectangle as a half plane."""
     port: list[Any] = [tuple(_SHEET.edge("top", "front", *_STRETCHES_M[k : k + 2]) for k in (0, 2))]
 
@@ -83,38 +63,38 @@ def front_edge() -> KnownNetwork:
         return np.array([z.real / _SHEET.sheet_resistance_ohm[0]])
 
     levels: list[Step] = [(f"{n} cells", partial(between, n)) for n in _GRIDS]
-    return KnownNetwork(np.array([_SQUARES]), 1e-15, {"sheet": levels})
+    return _question(name, [_SQUARES], 1e-15, {"sheet": levels})
 
 
-def stepped() -> KnownNetwork:
+def stepped(name: str) -> Question:
     """An electrode of 0.6 and 0.3 mm in turn: squares, and for each step what its corner adds, by a conformal map."""
     k = _THIN_MM / _THICK_MM
     step = ((k * k + 1) / k * log((1 + k) / (1 - k)) - 2 * log(4 * k / (1 - k * k))) / pi
     known = _STEPS * (_STEP_MM * (1 / _THIN_MM + 1 / _THICK_MM) / 2 + step)
     works: list[Step] = [(f"width {width:g} asked", partial(_comb, width)) for width in _WIDTHS]
-    return KnownNetwork(np.array([known]), DIGITS, {"conduction": works})
+    return _question(name, [known], DIGITS, {"conduction": works})
 
 
-def lines_across() -> KnownNetwork:
+def lines_across(name: str) -> Question:
     """Twelve lines side by side across the current: n lines and n - 1 contacts in a row."""
     share = (_ACROSS - 1) / _ACROSS / (_RHO_OHM_M * _LINE_MM * 1e-3)
     known = 1 + share * np.array(_CONTACTS_OHM_M2)
-    return KnownNetwork(known, DIGITS, {"traxels": [("", _across)], "traxels: as a solid": [("", lambda: np.ones(3))]})
+    works: dict[str, list[Step]] = {"traxels": [("", _across)], "traxels: as a solid": [("", lambda: np.ones(3))]}
+    return _question(name, known, DIGITS, works)
 
 
-def electrode() -> KnownNetwork:
+def electrode(name: str) -> Question:
     """Three layers of 100 x 10 mm, across, along and across, in two walls; contacts of 1e-4 ohm m2."""
 
     def printed() -> Values:
         lines = plate(100.0, 10.0, _LINE_MM, _LAYER_MM, (90, 180, 90))
         return np.array([traxels.resistance(lines, _RHO_OHM_M, 1e-4, (-48.9e-3, 48.9e-3), 3e-6).ratio])
 
-    return KnownNetwork(
-        np.array([1.422]), 0.05, {"traxels": [("", printed)], "traxels: as a solid": [("", lambda: np.ones(1))]}
-    )
+    works: dict[str, list[Step]] = {"traxels": [("", printed)], "traxels: as a solid": [("", lambda: np.ones(1))]}
+    return _question(name, [1.422], 0.05, works)
 
 
-STANDARD: dict[str, Callable[[], KnownNetwork]] = {
+STANDARD: dict[str, Callable[[str], Question]] = {
     "two films, one track shared": two_films,
     "sheet, contacts on one edge": front_edge,
     "electrode, steps across the current": stepped,
@@ -123,12 +103,11 @@ STANDARD: dict[str, Callable[[], KnownNetwork]] = {
 }
 
 
-def question(name: str) -> Question:
-    """Impedances of a network [ohm], or resistances over those of a solid [-], by its models."""
-    standard = STANDARD[name]()
+def _question(name: str, known: ArrayLike, known_to: float, models: Mapping[str, Sequence[Step]]) -> Question:
+    """Impedances of a network [ohm], or resistances over those of a solid [-], by its models from coarse to fine."""
     reasons = dict.fromkeys(("stack", "sheet", "conduction", "traxels", "line"), "this network is of another kind")
-    series, asked = own(standard.models.items(), reasons), "what a network of tracks, sheets or lines conducts"
-    return of_scene(name, asked, series, standard.known, standard.known_to, of_line)
+    series, asked = own(models.items(), reasons), "what a network of tracks, sheets or lines conducts"
+    return of_scene(name, asked, series, known, known_to, of_line)
 
 
 def _sections() -> tuple[list[list[float]], Values]:

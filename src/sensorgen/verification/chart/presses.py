@@ -18,7 +18,7 @@ from sensorgen.models import compression, fem2d, press2d, press3d, springs, thes
 from sensorgen.models.press2d import Elastic, Fineness
 from sensorgen.scene.scene import Fill, Scene
 from sensorgen.solvers.contact import mesher
-from sensorgen.verification.chart.question import Ladder, Question, Step, of_scene, own
+from sensorgen.verification.chart.results import Ladder, Question, Step, of_scene, own
 
 _EPS = {"x60": 4.68, "air": 1.00059}
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}

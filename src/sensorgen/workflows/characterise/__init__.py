@@ -10,8 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from sensorgen.analysis.characterise import posterior as posteriors
-from sensorgen.analysis.characterise.catalogue import (
+from sensorgen.analysis.characterise import (
     Coupon,
     CouponTarget,
     Meters,
@@ -19,6 +18,7 @@ from sensorgen.analysis.characterise.catalogue import (
     targets,
     unknowns,
 )
+from sensorgen.analysis.characterise import posterior as posteriors
 from sensorgen.analysis.characterise.posterior import CouponPosterior, Interval95, physical, posterior, prior
 from sensorgen.analysis.plots.figure import BLUE, Axis, Curve, Figure, Panel
 from sensorgen.analysis.plots.static import files, whole

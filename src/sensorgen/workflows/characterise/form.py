@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from sensorgen.analysis.characterise.catalogue import Coupon, CouponReading, CouponSize, Meters
+from sensorgen.analysis.characterise import Coupon, CouponReading, CouponSize, Meters
 from sensorgen.analysis.characterise.posterior import Observation
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName, within

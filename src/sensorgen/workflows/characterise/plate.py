@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import shapely
 from shapely import affinity
 
-from sensorgen.analysis.characterise import catalogue as drawn
-from sensorgen.analysis.characterise.catalogue import Coupon
+from sensorgen.analysis import characterise as drawn
+from sensorgen.analysis.characterise import Coupon
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design
 from sensorgen.design.printer import tower
