@@ -7,7 +7,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from browser import Page
 from click import ClickException
 from click.testing import CliRunner
 
@@ -184,9 +183,7 @@ def test_absent_programs_say_so(monkeypatch, unpressed):
     monkeypatch.setattr(peers, "missing", lambda peer: f"{peer} is not here")
     found = design.chart(bodies.drawn(small()), QUERY, ("capacitance", "line"), budget_s=0.05, runner=here)
     said = {s.model: s.why for s in found.silent}
-    assert {said[name] for name in (*peers.FIELD, "scikit-rf", "ngspice")} == {
-        f"{name} is not here" for name in (*peers.FIELD, "scikit-rf", "ngspice")
-    }
+    assert {name: said[name] for name in peers.ALL} == {name: f"{name} is not here" for name in peers.ALL}
     assert not [p for p in found.points if p.question == "capacitance" and p.independent]
     assert "which is not independent" in found._repr_html_()
 
@@ -245,11 +242,6 @@ def test_work_in_a_process_of_its_own():
         apart(os.abort)
 
 
-PROBE = """JSON.stringify({names: [...document.querySelectorAll(".plot")].flatMap(p => p.data.map(t => t.name)),
-  captions: [...document.querySelectorAll("caption")].map(c => c.textContent),
-  wide: document.documentElement.scrollWidth, ground: getComputedStyle(document.body).backgroundColor})"""
-
-
 def test_the_command_writes_its_files(tmp_path, monkeypatch, shared_cache):
     """In this process, of the line alone."""
     whole = design.chart
@@ -261,37 +253,6 @@ def test_the_command_writes_its_files(tmp_path, monkeypatch, shared_cache):
     assert str(tmp_path / "chart.html") in done.stdout.replace("\n", "")
     assert list(json.loads((tmp_path / "chart.json").read_text("utf-8"))["titles"]) == ["line"]
     assert (tmp_path / "chart.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.nightly
-def test_the_command(tmp_path, program):
-    """In processes of their own, as a user calls it; the page on a narrow and a wide screen, light and dark."""
-    words = ["tri", "--drawn", "--dielectric", "0.15", "--length", "40"]
-    words += ["--quantity", "capacitance", "--budget", "0.05"]
-    done = CliRunner().invoke(command, [*words, "-o", str(tmp_path)])
-    assert done.exit_code == 0, done.output
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["chart.csv", "chart.html", "chart.json", "chart.png"]
-    found = json.loads((tmp_path / "chart.json").read_text("utf-8"))
-    assert list(found["titles"]) == ["capacitance"]
-    assert {p["model"] for p in found["points"]} >= {"columns", "fem2d"}
-    assert all(p["cold_cpu_s"] > p["warm_cpu_s"] > 0 for p in found["points"])
-    assert "capacitance at rest: relative error" in done.output
-    assert (tmp_path / "chart.png").read_bytes()[:4] == b"\x89PNG"
-    page = Page(program("chromium", "chromium", "chromium-browser", "google-chrome"), tmp_path)
-    try:
-        for width, scheme in ((360, "light"), (1280, "dark")):
-            page.size(width)
-            page.media(scheme)
-            page.open(tmp_path / "chart.html")
-            shown = json.loads(page.run(PROBE))
-            assert shown["wide"] <= width
-            assert {p["model"] for p in found["points"]} <= set(shown["names"])
-            assert [c.partition(":")[0] for c in shown["captions"]] == ["capacitance at rest"]
-            assert (shown["ground"] == "rgb(255, 255, 255)") is (scheme == "light")
-            assert not page.complaints()
-            assert not page.asked()
-    finally:
-        page.close()
 
 
 @pytest.mark.parametrize(

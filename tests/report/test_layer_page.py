@@ -68,6 +68,7 @@ def test_travel_is_drawn_at_its_layer_and_toggled(browser, tmp_path):
     text = layers.of_print(printed, (), {"as sliced": sliced, "as written": written})
     (tmp_path / "page.html").write_text(text, "utf-8")
     browser.open(tmp_path / "page.html")
+    assert browser.run(SHOWN) == ["now"]
     browser.run("document.querySelectorAll('.travel').forEach(box => { if (!box.checked) box.click(); })")
     lengths = []
     for layer in range(len(printed.first)):
@@ -79,25 +80,14 @@ def test_travel_is_drawn_at_its_layer_and_toggled(browser, tmp_path):
     assert words[0].endswith("in contact with another tool's material, as sliced: 0.5 mm by tool 3, 0.2 mm by tool 4")
     assert words[3].endswith("as written: 0.0 mm")
     turn_to(browser, 5)
+    assert browser.run(AT) == "6 of 13: 0.5 to 0.6 mm"
     corner = browser.run(f"{WAYS}[0].getAttribute('d')")
     width, depth = printed.design.printed.size_mm[:2]
     assert corner.startswith(f"M{width / 2 - 3:g} {depth / 2 - 1:g}L")
     browser.run("document.querySelector('.travel').click()")
     assert browser.run(f"{WAYS}.length") == 0
     assert browser.run("document.querySelector('.travel[value=\"2\"]').disabled") is True
-
-
-def test_a_print_layer_by_layer(browser, tmp_path):
-    printed = body(make({"shape": "tri", "parameters": {"dielectric_mm": 0.2, "length_mm": 12.0}}))
-    (tmp_path / "page.html").write_text(layers.of_print(printed), "utf-8")
-    browser.size(1200)
-    browser.open(tmp_path / "page.html")
-    assert browser.run(SHOWN) == ["now"]
-    turn_to(browser, 5)
-    assert browser.run(SHOWN) == ["below", "now"]
-    assert browser.run(AT) == "6 of 13: 0.5 to 0.6 mm"
-    whole = browser.run("document.querySelectorAll('#plan .now path').length")
+    turn_to(browser, 0)  # of the lower electrode
     browser.run("document.querySelector('.body').click()")
-    assert browser.run("document.querySelectorAll('#plan .now path').length") <= whole
-    assert browser.complaints() == []
-    assert browser.asked() == []
+    assert browser.run("document.querySelectorAll('#plan .now path').length") == 0
+    assert (browser.complaints(), browser.asked()) == ([], [])

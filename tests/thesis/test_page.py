@@ -2,34 +2,12 @@
 
 import re
 from collections import Counter
-from html.parser import HTMLParser
 
 import pytest
+from html_page import HtmlPage
 
 from sensorgen.verification import thesis
 from sensorgen.verification.thesis.items import AGREES, ItemPart, ItemVerdict, ReproducedItem, ThesisItem
-
-VOID = {"meta", "input", "link"}
-
-
-class Page(HTMLParser):
-    """Start tags with what they carry, and whether all are closed."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.tags, self.open = [], []
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def of(self, tag):
-        return [attrs for name, attrs in self.tags if name == tag]
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +17,7 @@ def text(rows):
 
 @pytest.fixture(scope="module")
 def page(text):
-    return Page(text)
+    return HtmlPage(text)
 
 
 def test_the_page_is_whole(page, rows):

@@ -132,7 +132,7 @@ def _row(row: Compared, was: Compared | None, pf: dict[float, float], c: _ByFreq
         before_ohm = expected.value if expected else nan, nan
         ratios = {f: ratio for f, (_, ratio) in c.items()}
     else:
-        against, baked = f"reading {was.reading.number}", was.reading.words.baked is False and words.baked
+        against, baked = f"reading {was.reading.number}", was.reading.words.baked is False and bool(words.baked)
         before_ohm = was.verdict.ry_ohm, was.verdict.rz_ohm
         ratios = {f: value / pf[f] for f, (value, _) in c.items() if f in pf}
     lowest, bake = min(ratios, default=None), "" if words.baked is None else BAKED[words.baked]

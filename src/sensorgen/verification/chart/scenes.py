@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 
 from sensorgen import models
 from sensorgen.core import cache
@@ -37,13 +36,17 @@ def _prediction(name: str) -> Question:
     return replace(design.prediction(body, query), key=name, title=name, asked=asked, references=references)
 
 
-SCENES: dict[str, Callable[[], Question]] = {
-    name: partial(question, name) for scenes, question in (
-        (cells.STANDARD, cells.question), (presses.STANDARD, presses.question), (elastic.BLOCKS, elastic.of_block),
-        (elastic.MEMBRANE, elastic.of_membrane), (elastic.ROUND, elastic.of_round), (lines.STANDARD, lines.question),
-        (lines.INVERSION, lines.inversion), (["prediction of tri, 0.1 mm"], _prediction),
-    ) for name in scenes
-} | {name: partial(question, name) for name, question in networks.STANDARD.items()}  # fmt: skip
+SCENES: dict[str, Callable[[str], Question]] = {
+    **dict.fromkeys(cells.STANDARD, cells.question),
+    **dict.fromkeys(presses.STANDARD, presses.question),
+    **dict.fromkeys(elastic.BLOCKS, elastic.of_block),
+    **dict.fromkeys(elastic.MEMBRANE, elastic.of_membrane),
+    **dict.fromkeys(elastic.ROUND, elastic.of_round),
+    **dict.fromkeys(lines.STANDARD, lines.question),
+    **dict.fromkeys(lines.INVERSION, lines.inversion),
+    **networks.STANDARD,
+    "prediction of tri, 0.1 mm": _prediction,
+}
 
 
 def chart(
@@ -51,7 +54,7 @@ def chart(
 ) -> Chart:  # fmt: skip
     """Measure every model on the scenes of ``SCENES`` that are named, as in :func:`measured`, nothing stored."""
     with _nothing_stored():
-        answers = measured((SCENES[name]() for name in scenes), budget_s, step, runner)
+        answers = measured((SCENES[name](name) for name in scenes), budget_s, step, runner)
     told = {(p.question, p.model.partition(":")[0]) for p in answers.points}
     told |= {(s.question, s.model.partition(":")[0]) for s in answers.silent}
     unasked = (Silent(scene, name, _unasked(name, asked)) for scene, asked in answers.asked.items()
