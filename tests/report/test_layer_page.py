@@ -89,5 +89,5 @@ def test_travel_is_drawn_at_its_layer_and_toggled(browser, tmp_path):
     assert browser.run("document.querySelector('.travel[value=\"2\"]').disabled") is True
     turn_to(browser, 0)  # of the lower electrode
     browser.run("document.querySelector('.body').click()")
-    assert browser.run("document.querySelectorAll('#plan .now path').length") == 0
+    assert browser.run("document.querySelectorAll('#plan .now path:not(.way)').length") == 0
     assert (browser.complaints(), browser.asked()) == ([], [])
