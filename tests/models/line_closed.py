@@ -12,7 +12,7 @@ from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import OutOfRange
 from sensorgen.solvers.line.inputs import Inputs, PressedLine, read
 
-SOURCE = "Thesis appendix B, Eqs. B.39, B.42, B.48, B.51, B.53, and Eqs. 2.24 and B.54"
+SOURCE = "Thesis appendix B, Eqs. B.39, B.42, B.48, B.51 and B.53"
 PRINTED = ("B.39", "B.42", "B.48")
 
 Array = NDArray[Any]
@@ -68,59 +68,6 @@ def impedance(line: PressedLine, as_printed: str = "") -> Complex:
         for e, f, g, h in others:
             a, b, c, d = e * a + f * c, e * b + f * d, g * a + h * c, g * b + h * d
         return _finite(-d / c)
-
-
-def uniform(line: PressedLine) -> Complex:
-    r"""Impedance without force, in one equation (B.53, printed without fault).
-
-    .. math:: Z = \frac{\sqrt{2} \rho\, (1 + e^{2 \sqrt{2 \Gamma} L})}{H \sqrt{\Gamma} W (-1 + e^{2 \sqrt{2 \Gamma} L})}
-
-    Parameters
-    ----------
-    line : PressedLine
-        As of :func:`impedance`; force and patch are ignored.
-
-    Returns
-    -------
-    complex array
-        Impedance in the broadcast shape [ohm].
-
-    Raises
-    ------
-    OutOfRange
-        As :func:`impedance`.
-    """
-    inputs = _open(line)
-    r, y, _ = inputs.sections()
-    area = inputs["top_thickness_m"] * inputs["width_m"]
-    with np.errstate(all="ignore"):
-        rho, gamma = r[0] * area / 2, r[0] * y[0] / 2
-        e = np.exp(2 * np.sqrt(2 * gamma) * inputs["length_m"])
-        return _finite(np.sqrt(2.0) * rho * (1 + e) / (area * np.sqrt(gamma) * (-1 + e)))
-
-
-def series(line: PressedLine) -> Complex:
-    r"""Resistor and capacitor in series, Z = R + 1/(j omega C), as Eqs. 2.24, 2.25 and B.54 take the line.
-
-    Parameters
-    ----------
-    line : PressedLine
-        As of :func:`impedance`; force and patch are ignored.
-
-    Returns
-    -------
-    complex array
-        Impedance in the broadcast shape [ohm]; its real part is three times too large at low frequency.
-
-    Raises
-    ------
-    OutOfRange
-        A far end that is not open; no current at all.
-    """
-    inputs = _open(line)
-    r, y, _ = inputs.sections()
-    with np.errstate(all="ignore"):
-        return _finite(r[0] * inputs["length_m"] + 1 / (y[0] * inputs["length_m"]))
 
 
 def _open(line: PressedLine) -> Inputs:

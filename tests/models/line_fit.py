@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
 
-SOURCE = "Thesis appendix C.1, Eqs. C.1 to C.5, as printed and corrected"
+SOURCE = "Thesis appendix C.1, Eqs. C.1 to C.5, corrected"
 
 
 @dataclass(frozen=True)
@@ -50,17 +50,14 @@ class LineFit:
 
     Attributes
     ----------
-    form : str
-        "corrected", R over {1, F, F x, F x^2}; or "printed", over {1, F, x^2, x, F x} as in C.2.
     capacitance : (2,) array
         C0 [F], C_F [F/N].
-    resistance : array
-        Coefficients in the order of the form's basis [ohm, and per N and m].
+    resistance : (4,) array
+        Of 1, F, F x and F x^2 [ohm, and per N and m].
     residual_ohm : float
         Root mean square of what the fit of R leaves [ohm].
     """
 
-    form: str
     capacitance: Real
     resistance: Real
     residual_ohm: float
@@ -79,29 +76,11 @@ class LineFit:
             Measured at the frequency of the fit [F], [ohm].
         """
         force = self.force_n(capacitance_f)
-        square, linear, rest = self._in_position(force)
-        return Roots(force, _roots(square, linear, rest - np.asarray(resistance_ohm, float)))
-
-    def printed_position_m(self, capacitance_f: ArrayLike) -> Real:
-        """Position by C.5 of a fit, both as printed [m]: -(D + EF)^2 under the root, no R; nan where it is negative."""
-        square, linear, rest = self._in_position(self.force_n(capacitance_f))
-        under = -(linear**2) - 4 * square * rest
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray((-linear - np.sqrt(under)) / (2 * square))
-
-    def _in_position(self, force: Real) -> tuple[Real, Real, Real]:
-        """R as a polynomial in x: coefficients of x^2 and x, and the rest."""
-        if self.form == "corrected":
-            r0, a, e, b = self.resistance
-            return b * force, e * force, r0 + a * force
-        r0, a, b, d, e = self.resistance
-        return np.full_like(force, b), d + e * force, r0 + a * force
+        r0, a, e, b = self.resistance
+        return Roots(force, _roots(b * force, e * force, r0 + a * force - np.asarray(resistance_ohm, float)))
 
 
-def fit(
-    force_n: ArrayLike, position_m: ArrayLike, capacitance_f: ArrayLike, resistance_ohm: ArrayLike,
-    form: str = "corrected",
-) -> LineFit:  # fmt: skip
+def fit(force_n: ArrayLike, position_m: ArrayLike, capacitance_f: ArrayLike, resistance_ohm: ArrayLike) -> LineFit:
     """Fit R and C to known presses.
 
     Parameters
@@ -110,8 +89,6 @@ def fit(
         Presses [N], [m].
     capacitance_f, resistance_ohm : (n,) array
         Readings there at one frequency, see :func:`series` [F], [ohm].
-    form : str
-        "corrected" or "printed".
 
     Raises
     ------
@@ -127,9 +104,8 @@ def fit(
     """
     force, x, c, r = (np.asarray(a, float) for a in (force_n, position_m, capacitance_f, resistance_ohm))
     one = np.ones_like(force)
-    columns = (one, force, force * x, force * x * x) if form == "corrected" else (one, force, x * x, x, force * x)
-    resistance, left = _solved(np.stack(columns, -1), r)
-    return LineFit(form, _solved(np.stack([one, force], -1), c)[0], resistance, left)
+    resistance, left = _solved(np.stack((one, force, force * x, force * x * x), -1), r)
+    return LineFit(_solved(np.stack([one, force], -1), c)[0], resistance, left)
 
 
 def series(frequency_hz: float, impedance_ohm: ArrayLike) -> tuple[Real, Real]:

@@ -15,7 +15,7 @@ from scipy.integrate import quad
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import rect, tri
 from sensorgen.models import fem2d
-from sensorgen.models.columns import _mean_min, capacitance, why_not_applicable
+from sensorgen.models.columns import capacitance, why_not_applicable
 from sensorgen.scene.repetition import cell
 from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 from sensorgen.scene.sections import sections
@@ -45,8 +45,7 @@ def test_rect_lies_between_its_bounds(case):
     assert case["C_F"] * (1 + off) < found.upper
 
 
-@pytest.mark.parametrize(("length", "width"), [(100.0, 10.0), (10.0, 100.0), (6.0, 2.0)])
-@pytest.mark.parametrize("along", ["xy", "yx"])
+@pytest.mark.parametrize(("length", "width", "along"), [(100.0, 10.0, "xy"), (6.0, 2.0, "yx")])
 def test_many_cells_are_that_many_times_one(length, width, along):
     """100 x 10 mm once came out at -22.5 % instead of -14.3: sections that repeat were cut at the wrong prisms."""
     scene = rect.scene(rect.Params(length_mm=length, width_mm=width, dielectric_mm=0.1, along=along), Fill())
@@ -98,18 +97,11 @@ def test_one_jump_anywhere_forbids_the_columns_own_potential():
     assert capacitance(scene, EPS | {"x60": 50.0}).upper > fem2d.capacitance(scene, EPS | {"x60": 50.0}, 1e-4).lower
 
 
-@pytest.mark.parametrize("end_mm", [4.0, 14.0])
-def test_stairs_in_a_row_hold_as_much_as_one_each(end_mm):
-    """Where columns' own potentials jump, that of straight triangles repeats as the stairs do."""
-    found, one = capacitance(stair_row(end_mm), EPS), capacitance(stair_row(2.0), EPS)
-    assert (found.lower, found.upper) == close((one.lower * end_mm / 2, one.upper * end_mm / 2), 1e-11)
-
-
-def test_stairs_that_the_sensors_end_cuts_count_with_what_is_left_of_them():
-    """7.3 mm hold a period more than 5.3 mm, but for the best potential, which depends on what occurs how often."""
-    long, short, one = (capacitance(stair_row(end_mm), EPS) for end_mm in (7.3, 5.3, 2.0))
-    assert long.upper - short.upper == close(one.upper, 1e-2)
-    assert short.upper == close(2.65 * one.upper, 0.05)
+def test_stairs_in_a_row_hold_as_much_as_one_each():
+    """Where columns' own potentials jump, that of straight triangles repeats as the stairs do, up to a cut end."""
+    found, one, cut = (capacitance(stair_row(end_mm), EPS) for end_mm in (14.0, 2.0, 5.3))
+    assert (found.lower, found.upper) == close((7 * one.lower, 7 * one.upper), 1e-11)
+    assert cut.upper == close(2.65 * one.upper, 0.05)
 
 
 def stair_row(end_mm: float) -> Scene:
@@ -136,8 +128,7 @@ def reduced_mm(u: float, film: float, hang: float, lower: float, cog: bool, eps=
     return film / eps["x60"] + lower * u / quarter / eps["x60"] + gap / eps["air"] + hanging / eps["x60"]
 
 
-@pytest.mark.parametrize("film", [1e-4, 0.1, 0.2, 1.0])
-@pytest.mark.parametrize(("hang", "lower"), [(0.5, 0.24), (1.3, 0.01), (0.5, 0.499)])
+@pytest.mark.parametrize(("film", "hang", "lower"), [(0.1, 0.5, 0.24), (1e-4, 1.3, 0.01), (1.0, 0.5, 0.499)])
 def test_the_lower_bound_is_the_integral_of_its_columns(film, hang, lower):
     """Thesis 3.24: C' = eps0 int dx / s, by adaptive quadrature over the four flanks of a period."""
     sides = [
@@ -149,19 +140,18 @@ def test_the_lower_bound_is_the_integral_of_its_columns(film, hang, lower):
     assert got == close(expected, 1e-12)
 
 
-@pytest.mark.parametrize("film", [0.1, 0.2])
-def test_the_lower_bound_of_rect_is_the_corrected_sum_of_sixteen_columns(film):
+def test_the_lower_bound_of_rect_is_the_corrected_sum_of_sixteen_columns():
     """Models-cells.md: lower l and upper u in (eTPU, air, X60, air)."""
     strips = [("etpu", 0.7), ("air", 0.3), ("x60", 0.7), ("air", 0.3)]
     total = 0.0
     for (low, a), (high, b) in product(strips, strips):
-        s = film / EPS["x60"]
+        s = 0.1 / EPS["x60"]
         if low != "etpu":
             s += 0.3 / EPS[low]
             if high != "etpu":
                 s += 0.3 / EPS[high]
         total += a * b / s
-    assert capacitance(rect_cell(film), EPS).lower == close(EPS0_F_PER_M * MM * total, 1e-12)
+    assert capacitance(rect_cell(0.1), EPS).lower == close(EPS0_F_PER_M * MM * total, 1e-12)
 
 
 def trial_energy(film: float, hang: float = 0.5, lower: float = 0.24, n: int = 1500) -> float:
@@ -203,15 +193,6 @@ def trial_energy(film: float, hang: float = 0.5, lower: float = 0.24, n: int = 1
 def test_the_upper_bound_is_the_energy_of_its_trial_potential(film):
     """By finite differences, good to some 1e-5 here; Dirichlet's principle does the rest."""
     assert tri_bounds(film)[1] == close(EPS0_F_PER_M * trial_energy(film), 1e-4)
-
-
-@pytest.mark.parametrize("ends", [(0.2, 0.6), (0.6, 0.1), (0.1, 0.2), (0.4, 0.5), (0.2, 0.2)])
-def test_heights_up_to_a_limit(ends):
-    """Mean of min(h, 0.3) for h straight between two values, by quadrature."""
-    exact = quad(lambda share: min(ends[0] + share * (ends[1] - ends[0]), 0.3), 0, 1, points=[0.25, 0.6], epsabs=1e-12)[
-        0
-    ]
-    assert _mean_min(np.array(ends), 0.3) == close(exact, 1e-9)
 
 
 def test_the_straight_potential_is_that_of_scikit_fem():
@@ -257,22 +238,11 @@ def test_smooth_rows_hold_at_most_what_a_potential_of_the_height_alone_gives(cou
     assert found.upper <= EPS0_F_PER_M * 4 * 2 * MM / (height / mean + 0.7 - height) * (1 + 1e-6)
 
 
-@pytest.mark.parametrize("period", [0.1, 0.25, 0.5, 1.0, 2.0])
-@pytest.mark.parametrize("film", [0.1, 1.0])
+@pytest.mark.parametrize(("period", "film"), [(0.1, 0.1), (0.25, 1.0), (2.0, 0.1)])
 def test_triangles_of_any_pitch_hold_at_most_a_plate_on_their_film(period, film):
     """The upper electrode's cogs reach down to the film: no height above it is free of them."""
     plate = EPS0_F_PER_M * EPS["x60"] * 2 / film
     assert tri_bounds(film, period_mm=period)[1] <= plate * (1 + 1e-12)
-
-
-def test_a_film_named_apart_is_the_same_film():
-    scene = tri.scene(tri.Params(length_mm=2.0, width_mm=1.0, dielectric_mm=0.1), Fill(film="pla"))
-    found = capacitance(scene, EPS | {"pla": 4.68})
-    assert (found.lower / MM, found.upper / MM) == close(tri_bounds(0.1), 1e-12)
-
-
-def test_isolation_over_the_top_electrode_changes_nothing():
-    assert tri_bounds(0.1, isolation_mm=0.1) == close(tri_bounds(0.1), 1e-12)
 
 
 def half_covered() -> Scene:

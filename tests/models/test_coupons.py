@@ -10,8 +10,7 @@ from sensorgen.models import coupons
 LINE = virtual_lab.LINE_MM
 
 
-@pytest.mark.parametrize("share", [0.2, 0.9, 4.0])
-@pytest.mark.parametrize("flow", [0.9, 1.0])
+@pytest.mark.parametrize(("share", "flow"), [(0.2, 0.9), (4.0, 1.0)])
 def test_bar_across_lines_against_a_grid_on_every_line(share, flow):
     grid = virtual_lab.aligned_ratio(share, flow, 90.0, 10.0)
     closed = coupons.to_and_fro_resistivity(1 / flow, 1 + share, LINE * 1e-3, 10e-3)
@@ -29,7 +28,7 @@ def test_wide_bar_is_across_the_lines():
     assert coupons.to_and_fro_resistivity(1.0, 1.7, LINE * 1e-3, 10.0) == pytest.approx(1.7, rel=1e-3)
 
 
-@pytest.mark.parametrize("contact", [3e-5, 1e-4, 5e-4])
+@pytest.mark.parametrize("contact", [3e-5, 5e-4])
 def test_ladder_against_finite_differences(contact):
     grid = virtual_lab.ladder_ohm(0.2, 0.4, (contact, contact), 6.0, 6.0, 0.8)
     bar = coupons.bar_resistance(0.2, 0.2, 0.0, 6e-3, 6e-3, 0.8e-3)
@@ -37,7 +36,7 @@ def test_ladder_against_finite_differences(contact):
     assert float(both) == pytest.approx(grid - float(bar), rel=0.05)
 
 
-@pytest.mark.parametrize(("film", "eps"), [(0.4, 5.0), (1.2, 3.0), (2.8, 7.0)])
+@pytest.mark.parametrize(("film", "eps"), [(0.4, 5.0), (2.8, 7.0)])
 def test_plates_against_finite_volumes(film, eps):
     volumes = virtual_lab.plate_f(film, eps, step=0.04)
     closed = coupons.plate_capacitance(eps, 0.0, film * 1e-3, 10e-3, UPPER_MM * 1e-3)
@@ -60,8 +59,7 @@ def test_gap_of_published_plates():
 
 
 @pytest.mark.parametrize(("radius", "height", "q", "within"), [
-    (4.0, 6.0, 1e-3, 0.06), (4.0, 6.0, 1e-2, 0.06), (5.0, 3.0, 1e-2, 0.03), (6.0, 2.0, 1e-3, 0.03),
-    (8.0, 0.6, 1e-2, 0.03),
+    (4.0, 6.0, 1e-3, 0.06), (5.0, 3.0, 1e-2, 0.03), (8.0, 0.6, 1e-2, 0.03),
 ])  # fmt: skip
 def test_bonded_discs_against_finite_elements(radius, height, q, within):
     closed = float(coupons.bonded_modulus(1.0, q, radius, height))

@@ -19,7 +19,7 @@ SOFT = replace(
     piezoresistance_per_pa=(1e-6, -2e-6), tan_delta=0.01, leak_s_per_m=1e-9,
 )  # fmt: skip
 TONE = np.array(TONES)
-PLACES = [0.0, 0.002, 0.0048, 0.03, 0.0976, 0.1]  # of the tip's centre; its half is 5 mm
+PLACES = [0.0, 0.0048, 0.03, 0.0976]  # of the tip's centre; its half is 5 mm
 
 
 def by_hand(sensor, force, position, f):
@@ -57,8 +57,7 @@ def by_hand(sensor, force, position, f):
 
 
 @pytest.mark.parametrize("profile", ["hertz", "parabola"])
-@pytest.mark.parametrize("position", PLACES)
-@pytest.mark.parametrize("far_end", ["open", "short", 5e4])
+@pytest.mark.parametrize(("position", "far_end"), [(0.0, "open"), (0.0048, "short"), (0.03, 5e4), (0.1, "open")])
 def test_against_mpmath(profile, position, far_end):
     sensor = replace(SOFT, profile=profile, pieces=3, far_end=far_end)
     for f in (1.1e3, 99.7e3):
@@ -98,7 +97,7 @@ def check_slopes(sensor, force, position, by_force, step_m, by_position):
 
 @pytest.mark.parametrize("profile", ["hertz", "parabola"])
 @pytest.mark.parametrize("position", PLACES)
-@pytest.mark.parametrize(("force", "far_end"), [(0.5, "open"), (2.0, "open"), (2.0, "short"), (2.0, 5e4)])
+@pytest.mark.parametrize(("force", "far_end"), [(2.0, "open"), (2.0, 5e4)])
 def test_slopes_against_differences(profile, position, force, far_end):
     """By Richardson's rule from two short steps, as a law's slope bends at its points; at the very ends from inside."""
     check_slopes(replace(SOFT, profile=profile, far_end=far_end), force, position, 2e-6, 2.5e-6, 1e-4)
@@ -108,7 +107,7 @@ def test_slopes_against_differences(profile, position, force, far_end):
 @pytest.mark.parametrize("position", [0.002, 0.05])
 def test_pieces_converge_with_the_square_of_their_number(profile, position):
     sensor = replace(PLATE, profile=profile)
-    exact = replace(sensor, pieces=2048).response(TONE, 6.0, position)
+    exact = replace(sensor, pieces=512).response(TONE, 6.0, position)
     errors = []
     for count in (8, 16, 32, 64):
         found = replace(sensor, pieces=count).response(TONE, 6.0, position)
@@ -163,7 +162,7 @@ ROUND = {
 
 @pytest.mark.parametrize("profile", ROUND)
 @pytest.mark.parametrize("position", PLACES)
-@pytest.mark.parametrize(("force", "far_end"), [(0.5, "open"), (2.0, "open"), (2.0, "short")])
+@pytest.mark.parametrize(("force", "far_end"), [(0.5, "open"), (2.0, "short")])
 def test_slopes_of_a_contact_that_grows(profile, position, force, far_end):
     """Against differences by Richardson's rule; where the contact hangs over an end, too."""
     sensor = replace(ROUND[profile], far_end=far_end)
@@ -183,15 +182,3 @@ def test_at_one_force_it_is_a_tip_of_that_length(profile, position):
         flatter.response(TONE, 2.0, position), replace(sensor, contact=None).response(TONE, 2.0, position), strict=True
     ):
         assert one == pytest.approx(other, rel=1e-14)
-
-
-@pytest.mark.parametrize("profile", ROUND)
-def test_a_lighter_press_is_sharper_but_starts_like_a_flat_one(profile):
-    """Half the force on a shorter contact is more than half the pressure; at no force only the force counts."""
-    sensor = ROUND[profile]
-    assert sensor.stress_pa(0.5, 0.05) > 0.5 * sensor.stress_pa(1.0, 0.05)
-    first = sensor.response(1.1e3, 0.0, 0.05)
-    flat = replace(sensor, contact=None).response(1.1e3, 0.0, 0.05)
-    assert first.impedance_ohm == flat.impedance_ohm
-    assert first.by_force_ohm_per_n.imag == pytest.approx(flat.by_force_ohm_per_n.imag, rel=1e-6)
-    assert first.by_force_ohm_per_n.real == pytest.approx(flat.by_force_ohm_per_n.real, rel=0.05)  # R tells of place

@@ -60,11 +60,11 @@ def test_the_reference_curve_at_every_load(film):
     ],
 )
 def test_choices_of_the_boundary(name, held, nu):
-    """Up to 50 kPa; the reference curve goes to 100 kPa."""
-    found = press2d.press(tri(), solids(nu), STRESSES[:6], boundary=held)
+    """Up to 30 kPa; the reference curve goes to 100 kPa."""
+    found = press2d.press(tri(), solids(nu), STRESSES[:4], boundary=held)
     assert found.faults == ()
     early = 1 if name == "stick" else 0  # there the file is above what gives way without friction, which cannot be
-    known = VARIANTS[f"{name}_d0.1"]["uy_um"][:6]
+    known = VARIANTS[f"{name}_d0.1"]["uy_um"][:4]
     assert found.displacement_m[1 + early :] * 1e6 == pytest.approx(known[1 + early :], rel=0.015)
     assert found.displacement_m[1:] * 1e6 == pytest.approx(known[1:], rel=0.02)
 
@@ -81,34 +81,14 @@ def test_a_plate_that_widens_gains_area():
 
 
 def test_exactly_incompressible_is_the_limit():
-    moved = [press2d.press(tri(), solids(nu), STRESSES[:2]).displacement_m[-1] for nu in (0.4999, 0.49999, 0.5)]
-    assert moved[2] == pytest.approx(moved[1], rel=1e-3)
-    assert moved[0] > moved[1] > moved[2]
-
-
-@pytest.mark.parametrize("softer", [pytest.param(1 / 5, marks=pytest.mark.nightly), 3.667])
-def test_only_stress_over_modulus_counts(softer):
-    """Dimensions: the same cell at a share of all moduli and of all stresses gives way as far, by as many steps."""
-    one = press2d.press(tri(), solids(), STRESSES[:3])
-    scaled = press2d.press(tri(), solids(x60=6e6 / softer, etpu=22e6 / softer), STRESSES[:3] / softer)
-    assert scaled.displacement_m == pytest.approx(one.displacement_m, rel=1e-6, abs=1e-15)
-
-
-@pytest.mark.nightly
-def test_soft_x60_reaches_100_kpa():
-    """E of 1 MPa: a mesh that nothing repeats, half as coarse behind the apex, gives the same curve."""
-    stress = [0.0, 1e4, 5e4, 1e5]
-    found = press2d.press(tri(), solids(x60=1e6), stress, EPS)
-    assert (found.faults, found.converged_pa) == ((), 1e5)
-    finer = press2d.press(tri(), solids(x60=1e6), stress, fineness=Fineness(3e-3, 0.025, 0.075, 0.35))
-    assert finer.faults == ()
-    assert found.displacement_m[1:] == pytest.approx(finer.displacement_m[1:], rel=0.01)
+    softer, limit = (press2d.press(tri(), solids(nu), STRESSES[:2]).displacement_m[-1] for nu in (0.49999, 0.5))
+    assert limit < softer < limit * (1 + 1e-3)
 
 
 def test_levels_that_differ_are_told():
-    found = press2d.press(tri(), solids(), STRESSES[:2])
-    other = press2d.press(tri(), solids(x60=6.3e6), STRESSES[:2])
-    assert "two meshes differ by" in press2d.compared(found, other).faults[-1]
+    found = replace(faulty(1.0, 2.0), displacement_m=np.array([0.0, 1.02e-6]))
+    other = replace(found, displacement_m=np.array([0.0, 1e-6]))
+    assert press2d.compared(found, other).faults[-1] == "two meshes differ by 2.00% in displacement"
     assert press2d.compared(found, found).doubts[-1] == "two meshes differ by 0.00% in displacement"
 
 
@@ -214,24 +194,11 @@ def test_outlines_that_are_closed_in_the_wrong_place_do_not_pass(monkeypatch):
     assert "could not be meshed" in found.faults[-1]
 
 
-@pytest.mark.parametrize(("film", "period"), [(0.02, 2.0), (0.1, 1.0), (0.1, 4.0)])
-def test_thin_films_and_other_periods_are_pressed_at_once(film, period):
-    found = press2d.press(
-        press2d.cell(make({"shape": "tri", "parameters": {"dielectric_mm": film, "period_mm": period}}).in_use, period),
-        solids(),
-        [0.0, 1e4, 2e4],
-        EPS,
-        fineness=Fineness(7e-4, 0.1, 0.2),
-    )
+def test_a_thin_film_of_another_period_is_pressed_at_once():
+    found = press2d.press(tri(0.02, period_mm=1.0), solids(), [0.0, 1e4, 2e4], EPS, fineness=Fineness(7e-4, 0.1, 0.2))
     assert (found.faults, found.doubts) == ((), ())
     assert (np.diff(found.displacement_m) > 0).all()
     assert max(c.width() for c in found.capacitance_f_per_m2) < 3e-3
-
-
-@pytest.mark.parametrize("stresses", [[1.0, 2.0], [0.0], [0.0, 2.0, 1.0]])
-def test_stresses_that_do_not_rise_from_0_are_refused(stresses):
-    with pytest.raises(OutOfRange, match="begin with 0"):
-        press2d.press(tri(), solids(), stresses)
 
 
 def test_what_is_no_prism_or_no_solid_is_refused():
@@ -241,6 +208,9 @@ def test_what_is_no_prism_or_no_solid_is_refused():
         press2d.Elastic(6e6, 0.51)
     with pytest.raises(BadInput, match="bonded or sliding"):
         press2d.press(tri(), solids(), [0.0, 1.0], boundary=BoundaryConditions(base="glued"))
+    for stresses in ([1.0, 2.0], [0.0, 2.0, 1.0]):
+        with pytest.raises(OutOfRange, match="begin with 0"):
+            press2d.press(tri(), solids(), stresses)
 
 
 def test_work_and_energy_are_weighed():
@@ -250,8 +220,7 @@ def test_work_and_energy_are_weighed():
     assert pressed._imbalance(stress, moved, np.array([0.0, 0.5, 2.5]))[2] == pytest.approx(-0.2)
 
 
-@pytest.mark.parametrize("stiffer", [2, 5, 10])
-@pytest.mark.parametrize("closes", [42.0, 48.0, 50.0, 55.0])
+@pytest.mark.parametrize(("stiffer", "closes"), [(2, 48.0), (5, 42.0), (10, 50.0), (10, 55.0)])
 def test_a_gap_that_closes_within_a_load_step_is_no_fault(stiffer, closes):
     """Springs of which more carry from one load on: the sum alone is off by up to 1.8 %; wrong energy is still seen."""
     stress = np.array([0, 2.5, 5, 10, 20, 30, 40, 60, 75])

@@ -47,13 +47,12 @@ def test_a_bonded_foot_is_nearly_linear(bonded):
     assert bonded.displacement_m[2] == pytest.approx(2 * bonded.displacement_m[1], rel=0.02)
 
 
-@pytest.mark.parametrize("lift", [1e-3, 0.05])
-def test_a_free_foot_falls_and_then_carries_as_if_it_stuck(bonded, lift):
+def test_a_free_foot_falls_and_then_carries_as_if_it_stuck(bonded):
     """A flat foot that rests on the film and cannot slip differs from a bonded one only in its corners."""
     held = BoundaryConditions(contact="stick")
-    found = press2d.press(stacked(0.2, 0.3, lift=lift), SOLIDS, [0.0, 5e3, 1e4], EPS, held, QUICK)
+    found = press2d.press(stacked(0.2, 0.3, lift=0.05), SOLIDS, [0.0, 5e3, 1e4], EPS, held, QUICK)
     assert found.faults == ()
-    assert found.fall_m == pytest.approx(lift * 1e-3, rel=1e-6)
+    assert found.fall_m == pytest.approx(0.05e-3, rel=1e-6)
     assert "the top falls" in found.doubts[-1]
     assert found.displacement_m[0] == 0
     assert found.displacement_m[1:] - found.fall_m == pytest.approx(bonded.displacement_m[1:], rel=0.06)
@@ -135,21 +134,6 @@ def test_a_cell_without_mirrors_stands_between_mirrors():
     found = press2d.press(press2d.cell(Scene(bodies, (4.0, 10.0, 1.0)), 2.0), SOLIDS, [0.0, 1e4], EPS, fineness=QUICK)
     assert found.faults == ()
     assert "mirror image" in found.doubts[0]
-
-
-def test_a_peak_between_the_same_bodies_stays_and_a_line_that_runs_on_is_one():
-    bodies = (
-        Body("bottom_electrode", "etpu", prisms((0, 4, 0, 0.3)), "bottom"),
-        Body(
-            "film",
-            "x60",
-            (Prism("y", ((0, 0.3), (4, 0.3), (4, 0.5), (3, 0.7), (2, 0.5), (1, 0.7), (0, 0.5)), 0.0, 10.0),),
-        ),
-        Body("top_electrode", "etpu", prisms((0, 2, 1.0, 1.3), (2, 4, 1.0, 1.3)), "top"),
-    )
-    cell = press2d.cell(Scene(bodies, (4.0, 10.0, 1.3)), 4.0)
-    points = {point for edge in cell.edges for point in edge}
-    assert (1.0, 0.7) in points
 
 
 def test_outlines_that_cross_never_reach_the_mesher():

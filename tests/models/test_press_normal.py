@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sensorgen.design.design import make
 from sensorgen.scene.repetition import slices
 from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 from sensorgen.scene.sections import sections
@@ -20,6 +19,7 @@ EPS = {"x60": 4.68, "etpu": 5.0, "air": 1.00059}
 EPS0 = 8.8541878e-12
 SOFT = {"x60": Elastic(1e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
 BASE = 0.3
+ROUGH = Fineness().scaled(2)
 
 
 def cell_of(high, left, right, *outlines):
@@ -38,54 +38,22 @@ def box(left, right, low, high):
     return rectangle(left, right, BASE + low, BASE + high)
 
 
-def pillars(gap, count):
-    """Half a pillar 0.45 mm wide and 0.5 high before a mirror, or two halves ``gap`` apart."""
+def pillars(gap):
+    """Half a pillar 0.45 mm wide and 0.5 high, half of a gap before a mirror."""
     period = 0.45 + gap
-    bars = [box(k * period + gap / 2, (k + 1) * period - gap / 2, 0, 0.5) for k in range(3)]
-    return cell_of(0.5, 0.5 * period, (0.5 + count / 2) * period, *bars)
+    return cell_of(0.5, 0.5 * period, period, *(box(k + gap / 2, k + 0.45 + gap / 2, 0, 0.5) for k in (0, period)))
 
 
-def solved(cell, stresses, held=None):
-    return press2d._solved(cell, SOFT, stresses, held or BoundaryConditions(), Fineness(), lambda _: None)
+def solved(cell, stresses, held=None, fineness=None):
+    return press2d._solved(cell, SOFT, stresses, held or BoundaryConditions(), fineness or Fineness())
 
 
-def with_field(cell, stresses, solids=SOFT, fineness=None):
+def with_field(cell, stresses):
     """Capacitances of a cell [F/m2], all of which have to be known; and its displacements [m]."""
-    found = press2d.press(cell, solids, stresses, EPS, fineness=fineness)
+    found = press2d.press(cell, SOFT, stresses, EPS)
     assert found.faults == ()
     assert max(c.width() for c in found.capacitance_f_per_m2) < 1e-3
     return np.array([c.middle() for c in found.capacitance_f_per_m2]), np.array(found.displacement_m)
-
-
-STRESSES = np.linspace(0, 4e5, 9)
-
-
-@pytest.fixture(scope="module")
-def mirrored():
-    return press2d.press(pillars(0.05, 1), SOFT, STRESSES, EPS)
-
-
-@pytest.mark.nightly
-def test_two_pillars_that_bulge_into_each_other_are_one_before_a_mirror(mirrored):
-    both = press2d.press(pillars(0.05, 2), SOFT, STRESSES, EPS)
-    assert (mirrored.faults, both.faults) == ((), ())
-    one, two = (np.array([c.middle() for c in f.capacitance_f_per_m2]) for f in (mirrored, both))
-    assert two == pytest.approx(one, rel=1e-3, abs=0)
-    assert np.diff(two).min() > 0
-    assert max(c.width() for f in (mirrored, both) for c in f.capacitance_f_per_m2) < 3e-5
-    assert both.displacement_m[1:] == pytest.approx(mirrored.displacement_m[1:], rel=0.01)  # the meshes differ
-
-
-@pytest.mark.nightly
-def test_pillars_that_meet_are_stiffer_than_free_ones(mirrored):
-    """Rubber that keeps its volume between mirrors is hardly compressed; free pillars are, at half of the first rate.
-
-    That is 0.482 on meshes of 0.7 to a third of the usual size.
-    """
-    free, _ = solved(pillars(0.3, 1), STRESSES)
-    met, alone = (np.diff(f.displacement_m) / np.diff(f.stress_pa) for f in (mirrored, free))
-    assert met[-1] < 0.15 * met[0]
-    assert alone[-1] == pytest.approx(0.482 * alone[0], rel=0.03)
 
 
 def test_faces_that_run_through_each_other_are_caught(monkeypatch):
@@ -97,21 +65,20 @@ def test_faces_that_run_through_each_other_are_caught(monkeypatch):
         return pairs.some(np.zeros(len(pairs.point), bool))
 
     monkeypatch.setattr(contact.Faces, "project", blind)
-    for count in (1, 2):
-        found, _ = solved(pillars(0.05, count), STRESSES)
-        assert found.faults[0].startswith("converged up to")
-        assert found.converged_pa < 4e5  # they touch at 120 kPa
+    found, _ = solved(pillars(0.05), np.linspace(0, 4e5, 9))
+    assert found.faults[0].startswith("converged up to")
+    assert found.converged_pa < 4e5  # they touch at 120 kPa
 
 
 def test_the_capacitance_is_continuous_where_pillars_meet():
     """Loads 3 kPa apart from 120 kPa on, where they meet: C goes on rising, never by a step."""
     stresses = np.concatenate([np.linspace(0, 1.14e5, 3), np.arange(1.17e5, 1.51e5, 3e3)])
-    middle, _ = with_field(pillars(0.05, 1), stresses)
+    middle, _ = with_field(pillars(0.05), stresses)
     rises = np.diff(middle[3:])
     assert (rises[1:] / rises[:-1]).min() > 0.6
     assert (rises[1:] / rises[:-1]).max() < 1.1
     assert rises[-1] < 0.7 * rises[0]  # slower once they have met
-    at_once, _ = with_field(pillars(0.05, 1), [0.0, stresses[-1]])
+    at_once, _ = with_field(pillars(0.05), [0.0, stresses[-1]])
     assert middle[-1] == pytest.approx(at_once[1], rel=1e-4, abs=0)
 
 
@@ -135,13 +102,12 @@ def forces(run, state):
     return contact_force(run.problem, state).reshape(-1, 2), run.problem.places(state.u_m)
 
 
-@pytest.mark.parametrize("turned", [False, pytest.param(True, marks=pytest.mark.nightly)])
-def test_a_dovetail_is_held_on_its_undercut_flank(turned):
-    """Two trapezia that hook under each other: forces and moments of the contact cancel, also drawn the other way."""
+def test_a_dovetail_is_held_on_its_undercut_flank():
+    """Two trapezia that hook under each other: forces and moments of the contact cancel."""
     foot = [(0, 0), (0.45, 0), (0.25, 0.5), (0, 0.5)]
     hook = [(0.5, 0), (0.7, 0), (0.7, 0.5), (0.3, 0.5)]
-    drawn = [[(0.7 - x if turned else x, BASE + y) for x, y in shape] for shape in (foot, hook)]
-    found, run = solved(cell_of(0.5, 0, 0.7, *(d[::-1] if turned else d for d in drawn)), np.linspace(0, 2e5, 4))
+    drawn = [[(x, BASE + y) for x, y in shape] for shape in (foot, hook)]
+    found, run = solved(cell_of(0.5, 0, 0.7, *drawn), np.linspace(0, 2e5, 4))
     assert found.faults == ()
     assert found.displacement_m[-1] * 1e6 == pytest.approx(33.4, rel=0.005)
     force, places = forces(run, run.states[-1])
@@ -160,7 +126,7 @@ def slope(drop, gap=1e-3):
     return cell_of(0.6, 0, 0.7, lower, upper)
 
 
-@pytest.mark.parametrize("drop", [0.0, 0.2, 0.4])
+@pytest.mark.parametrize("drop", [0.0, 0.4])
 def test_a_sloping_joint_hands_an_even_pressure_on(drop):
     """Patch test: what keeps its volume between fixed walls bears p everywhere, whatever the joint's slope.
 
@@ -187,9 +153,9 @@ def test_a_sloping_joint_that_sticks_is_none():
     """At nu = 0.3 the joint bears shear: held fast it gives way as the whole block does, loose it slides."""
     solids = {"x60": Elastic(1e6, 0.3), "etpu": Elastic(22e6, 0.3)}
     whole = cell_of(0.6, 0, 0.7, box(0, 0.7, 0, 0.6))
-    one = press2d.press(whole, solids, [0.0, 1e4, 2e4]).displacement_m
+    one = press2d.press(whole, solids, [0.0, 1e4, 2e4], fineness=ROUGH).displacement_m
     held, loose = (
-        press2d.press(slope(0.4), solids, [0.0, 1e4, 2e4], None, BoundaryConditions(contact=kind)).displacement_m
+        press2d.press(slope(0.4), solids, [0.0, 1e4, 2e4], None, BoundaryConditions(contact=kind), ROUGH).displacement_m
         for kind in ("stick", "frictionless")
     )
     assert np.diff(held)[1] == pytest.approx(np.diff(one)[1], rel=0.02)
@@ -198,7 +164,7 @@ def test_a_sloping_joint_that_sticks_is_none():
 
 def test_the_energy_of_the_contact_is_that_of_its_forces():
     """Gap and slip: the energy's differences along a motion are the forces' work."""
-    _, run = solved(slope(0.4), [0.0, 1e4], BoundaryConditions(contact="stick"))
+    _, run = solved(slope(0.4), [0.0, 1e4], BoundaryConditions(contact="stick"), ROUGH)
     problem, state = run.problem, run.states[-1]
     assert state.pairs.sticks.any()
     ways = np.random.default_rng(1).normal(size=(2, len(state.u_m)))
@@ -209,27 +175,3 @@ def test_the_energy_of_the_contact_is_that_of_its_forces():
     slid = problem.slips(state.pairs, state.u_m)[:, 0] * state.pairs.sticks
     assert (state.pairs.stiffness_pa * slid**2).sum() > 0.1 * problem.contact_energy(state)
     assert (after - before) / 2 == pytest.approx(force @ motion, rel=1e-4, abs=0)
-
-
-def test_steps_of_any_length_stick_alike():
-    """What touches within a load step holds where it first did: one step or four, 3 % apart."""
-    drawn = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})
-    solids = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
-    cell = press2d.cell(drawn.in_use, drawn.params.period_mm)
-    moved = [
-        press2d.press(
-            cell, solids, np.linspace(0, 1e4, n + 1), None, BoundaryConditions(contact="stick")
-        ).displacement_m[-1]
-        for n in (1, 4)
-    ]
-    assert moved[0] == pytest.approx(moved[1], rel=0.03)
-
-
-@pytest.mark.nightly
-def test_feet_that_bulge_have_a_capacitance_on_a_fine_mesh():
-    """Layers of feet whose sides roll onto the film and under the next layer; half the sizes are 0.1 % apart."""
-    feet = [box(0.3, 0.7, 0.1, 0.2), box(0.2, 0.8, 0.2, 0.3)]
-    cell = cell_of(0.3, 0, 1.0, box(0, 1.0, 0, 0.1), *feet)
-    (coarse, _), (fine, _) = (with_field(cell, STRESSES[::2] / 4, fineness=Fineness().scaled(f)) for f in (1, 0.5))
-    assert np.diff(fine).min() > 0
-    assert coarse == pytest.approx(fine, rel=3e-3, abs=0)

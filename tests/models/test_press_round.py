@@ -170,8 +170,8 @@ def slope_m_per_pa(scene, solids, fine_mm):
 @pytest.mark.parametrize("shape", ["pyramid", "cone"])
 def test_blunt_tips_deform_as_finite_elements_in_3d_within_the_stated_error(shape):
     coarse, fine = BLUNT["displacement_m_per_pa"][shape]
-    found = press_round.press(make({"shape": shape, "parameters": {"tip_mm": 0.5}}).in_use, SOLIDS, [0.0, 1e3, 2e3])
-    assert found.displacement_m[2] / 2e3 == pytest.approx(2 * fine - coarse, rel=0.03)
+    found = press_round.press(make({"shape": shape, "parameters": {"tip_mm": 0.5}}).in_use, SOLIDS, [0.0, 2e3])
+    assert found.displacement_m[1] / 2e3 == pytest.approx(2 * fine - coarse, rel=0.03)
     assert not found.faults
 
 
@@ -189,7 +189,8 @@ def test_the_stored_finite_elements_in_3d_are_found_again(shape):
 
 
 @pytest.mark.parametrize(("shape", "within"), [
-    pytest.param("bump", 0.005, marks=pytest.mark.nightly), ("cone", 0.005), ("pyramid", 0.03),
+    pytest.param("bump", 0.005, marks=pytest.mark.nightly), ("cone", 0.005),
+    pytest.param("pyramid", 0.03, marks=pytest.mark.nightly),
 ])  # fmt: skip
 def test_bounds_at_rest_meet_and_are_near_those_in_3d(shape, within):
     scene = make({"shape": shape, "parameters": {"length_mm": 1.25, "width_mm": 1.25}}).in_use

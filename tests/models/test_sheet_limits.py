@@ -46,17 +46,10 @@ def test_a_hundred_times_the_depth_chooses_a_finer_grid_and_beyond_that_says_so(
         solve(Sheet(0.1, 0.01, (450.0, 700.0), 7e-8), [PORT_NARROW], 1e3, accuracy=1e-14)
 
 
-@pytest.mark.parametrize("hertz", [1e50, 9e99])
-def test_a_number_of_cells_that_nobody_has_is_no_advice(hertz):
+def test_a_number_of_cells_that_nobody_has_is_no_advice():
     for cells in (20, None):
         with pytest.raises(OutOfRange, match=r"too coarse.* long: use a lower frequency$"):
-            impedance(FILM, [PORT], hertz, cells=cells)
-
-
-@pytest.mark.parametrize("hertz", [1e100, 1e308, float("inf")])
-def test_frequencies_beyond_all_are_refused(hertz):
-    with pytest.raises(OutOfRange, match=r"below 1e\+100"):
-        impedance(FILM, [PORT], hertz)
+            impedance(FILM, [PORT], 9e99, cells=cells)
 
 
 PORT_NARROW = tuple(Contact(side, (0.0, 0.0), (0.0, 0.01)) for side in ("top", "bottom"))
@@ -76,7 +69,6 @@ def test_very_unequal_sheets(ratio):
         ([(PORT[0], PORT[0])], "reads nothing"),
         ([(PORT[0], FILM.edge("top", "front"))], "shorted"),
         ([PORT, (Contact("top", (0.0, 0.02), (0.01, 0.02)), PORT[1])], "shorted"),
-        ([(PORT[0], Contact("bottom", (0.09, 0.11), (0.0, 0.01)))], "beyond the sheet"),
         ([(PORT[0], Contact("bottom", (0.0, 0.01), (-0.01, 0.01)))], "y = -10 to 10 mm"),
     ],
 )
@@ -96,7 +88,6 @@ def test_one_contact_may_serve_two_ports():
     ("make", "error", "words"),
     [
         (lambda: Contact("middle", (0, 1), (0, 1)), UnknownName, "middle"),
-        (lambda: Contact("top", (0.02, 0.01), (0, 1)), OutOfRange, "give the lower first"),
         (lambda: Contact("top", (float("nan"), 0.01), (0, 1)), OutOfRange, "give the lower first"),
         (lambda: Contact("top", (0.01, 0.01), (0.02, 0.02)), OutOfRange, "infinite"),
         (lambda: FILM.edge("top", "north"), UnknownName, "north"),
@@ -104,17 +95,13 @@ def test_one_contact_may_serve_two_ports():
         (lambda: replace(FILM, width_m="10"), BadInput, "width_m takes a number"),
         (lambda: replace(FILM, sheet_resistance_ohm=(450.0, -1.0)), OutOfRange, "bottom sheet"),
         (lambda: replace(FILM, sheet_resistance_ohm=(450.0,)), BadInput, "two numbers"),
-        (lambda: replace(FILM, tan_delta=float("nan")), OutOfRange, "tan_delta"),
         (lambda: replace(FILM, capacitance_f_per_m2=np.array([[1e-8, -1e-8]])), OutOfRange, "capacitance"),
         (lambda: replace(FILM, capacitance_f_per_m2=np.array([1e-8, 1e-8])), BadInput, "array"),
         (lambda: SheetPatch(0, 0, 0.0, 0.01), OutOfRange, "length_m of the patch has to be above 0"),
-        (lambda: SheetPatch(0, -0.01, 0.01, 0.01), OutOfRange, "y_m of the patch"),
-        (lambda: SheetPatch(0, 0, 0.01, 0.01, 1.0, (0.0, 1.0)), OutOfRange, "resistance_factor"),
         (lambda: impedance(FILM, [PORT], 1e3, SheetPatch(0.095, 0, 0.01, 0.01)), OutOfRange, "beyond the sheet"),
-        (lambda: impedance(FILM, [PORT], -1.0), OutOfRange, "not -1"),
         (lambda: impedance(FILM, [PORT], [1e3, float("nan")]), OutOfRange, "not nan"),
+        (lambda: impedance(FILM, [PORT], 1e100), OutOfRange, r"below 1e\+100"),
         (lambda: impedance(FILM, [PORT], "1kHz"), BadInput, "Hz"),
-        (lambda: impedance(FILM, [PORT], []), BadInput, "Hz"),
         (lambda: impedance(FILM, [PORT], 1e3, cells=0), OutOfRange, "one cell"),
         (lambda: solve(FILM, [PORT], 1e3, of=["x_m"]), OutOfRange, "needs a patch"),
         (lambda: solve(FILM, [PORT], 1e3, SheetPatch(0, 0, 0.01, 0.01), of=["x"]), UnknownName, "x_m"),

@@ -69,7 +69,7 @@ def nodal(f, stack, touch, body, driven, low, bridge, cells):
 @pytest.mark.parametrize("stack", [SINGLE, DOUBLE], ids=["single", "double"])
 @pytest.mark.parametrize("bridge", [False, True])
 @pytest.mark.parametrize("turned", [False, True])
-@pytest.mark.parametrize("f", [1.1e3, 99.7e3, 1e6])
+@pytest.mark.parametrize("f", [1.1e3, 1e6])
 def test_it_is_what_kirchhoff_says(stack, bridge, turned, f):
     n = len(stack.films)
     ends = (n - 1, n) if turned else (n, n - 1)
