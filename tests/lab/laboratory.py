@@ -91,12 +91,26 @@ def laboratory(faults: tuple[Planted, ...] = (), **changes: float) -> Laboratory
     return Laboratory(clock, at, rig, {role: each.simulator for role, each in made.items()}, watched)
 
 
-def outcome(folder: Path, faults: tuple[Planted, ...] = (), **changes: Any) -> tuple[run.RunResult, Laboratory]:
-    """Run the short experiment with faults planted."""
-    lab = laboratory(faults)
+def done(folder: Path, lab: Any, changes: dict[str, Any] | None = None, **extra: Any) -> run.RunResult:
+    """Run the short experiment with some changes in a laboratory, or on anything with a clock and a rig."""
     with Log(folder / "log.db", create=True) as log:
-        found = run.run(asked(**changes), clock=lab.clock, log=log, rig=lab.rig, simulated=True)
-    return found, lab
+        return run.run(asked(**changes or {}), clock=lab.clock, log=log, rig=lab.rig, simulated=True, **extra)
+
+
+def outcome(folder: Path, faults: tuple[Planted, ...] = (), **changes: Any) -> tuple[run.RunResult, Laboratory]:
+    """Run it with faults planted."""
+    lab = laboratory(faults)
+    return done(folder, lab, changes), lab
+
+
+def left_alone(lab: Laboratory, seconds: float) -> float:
+    """Leave the mechanism without commands; time until its tip was last down [s]."""
+    begin = last = lab.clock.now()
+    while lab.clock.now() < begin + seconds:
+        lab.clock.wait_until(lab.clock.now() + 0.005)
+        lab.simulators["actuator"].exchange(b"", lab.clock.now())
+        last = lab.clock.now() if lab.mechanism.force_n > 0 else last
+    return last - begin
 
 
 def verdict(found: run.RunResult, lab: Laboratory, what: str) -> list[str]:

@@ -6,7 +6,7 @@ import numpy as np
 class SpringPlant:
     """A specimen of 2 N/mm below 20 mm of air; 1 kohm and 10 pF that grows with the force."""
 
-    weight_n = 0.9
+    weight_n, stroke_mm = 0.9, 50.0
 
     def __init__(self, *, extension_mm=0.0, touch_mm=20.0, stiffness_n_mm=2.0, speed_mm_s=400.0):
         self.extension_mm, self.motor_n, self.time_s = extension_mm, 0.0, 0.0
@@ -28,7 +28,7 @@ class SpringPlant:
 
     def _step(self, step):
         for axis in self.axes.values():
-            axis[0] += np.clip(axis[1] - axis[0], -axis[2] * step, axis[2] * step)
+            axis[0] = _towards(axis[0], axis[1], axis[2] * step)
         if not self.on:
             return
         speed, motor = self.fastest, self.motor_n
@@ -39,8 +39,7 @@ class SpringPlant:
             highest = self.touch_mm + self.axes["z"][0] + max(0.0, most + self.weight_n) / self.stiffness
             goal = min(target, highest)
             self.motor_n = self.force_n - self.weight_n
-        self.extension_mm += np.clip(goal - self.extension_mm, -speed * step, speed * step)
-        self.extension_mm = float(np.clip(self.extension_mm, 0.0, 50.0))
+        self.extension_mm = min(max(_towards(self.extension_mm, goal, speed * step), 0.0), self.stroke_mm)
 
     def switch(self, *, on):
         """Motor."""
@@ -52,7 +51,7 @@ class SpringPlant:
 
     def drive(self, motor_n):
         """Force mode."""
-        self.goal, self.motor_n = None, float(np.clip(motor_n, -self.most_n, self.most_n))
+        self.goal, self.motor_n = None, min(max(motor_n, -self.most_n), self.most_n)
 
     def seek(self, extension_mm, speed_mm_s, motor_n):
         """Position mode."""
@@ -75,3 +74,7 @@ class SpringPlant:
     def resistance(self, *, wires):
         """Leads of half an ohm each."""
         return 650.0 + (1.0 if wires == 2 else 0.0)
+
+
+def _towards(now, goal, most):
+    return goal if abs(goal - now) <= most else now + (most if goal > now else -most)

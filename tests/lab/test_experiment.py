@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import pytest
 
-from sensorgen.core import yamlfile
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.records import checked
 from sensorgen.measure.lab import experiment, run
@@ -108,8 +107,3 @@ def test_ramp_sine_and_sweep_have_the_forces_and_places_that_were_asked_for():
     rise = (3.0 - 0.3) / 20
     assert [sine.force_at(rise + t) for t in (0.5, 1.5, 2.5)] == pytest.approx([4.0, 2.0, 4.0])
     assert [step.place_mm for step in sweep] == [80, 60, 40, 20]
-
-
-def test_numbers_are_read_as_yaml_writes_them():
-    data = yamlfile.parse("specimen: 24 triX .2mm\nplan: [{hold: {position_mm: 50, force_n: 3, hold_s: 1e1}}]", "x")
-    assert checked(experiment.Experiment, data).plan[0].content.hold_s == 10

@@ -48,13 +48,10 @@ def test_nothing_is_sent_to_anybody_before_all_have_said_who_they_are(tmp_path, 
 
 
 def test_the_limit_holds_where_the_actuator_presses_with_all_it_has(tmp_path):
-    found, lab = outcome(tmp_path, (Planted(what="actuator runaway", at_force_n=1.0),), plan=_at_the_limit())
+    plan = [{"hold": {"position_mm": 50, "force_n": 6.6, "hold_s": 1.0}}]
+    found, lab = outcome(tmp_path, (Planted(what="actuator runaway", at_force_n=1.0),), plan=plan)
     assert found.end == "fault"
     assert all(each.duration_s <= 0.01 + 1e-9 for each in lab.mechanism.violations)
-
-
-def _at_the_limit():
-    return [{"hold": {"position_mm": 50, "force_n": 6.6, "hold_s": 1.0}}]
 
 
 def test_the_verdict_sees_a_tip_that_is_left_down(tmp_path):

@@ -198,16 +198,9 @@ def test_the_page_shows_map_trace_force_and_regions(browser, model):
             until -= 1
         assert feed.paused
         assert feed.unloaded_s == 1.0
-        assert live.dropped == 0
+        feed.obey(["resume", "record", "stop"])
+        assert (feed.paused, feed.recording, feed.over, live.dropped) == (False, False, True, 0)
         assert browser.complaints() == []
-
-
-def test_commands_of_the_page():
-    feed = feed_of(walker(10.0), SimulatedClock())
-    feed.obey(["pause", "record"])
-    assert (feed.paused, feed.recording, feed.over) == (True, False, False)
-    feed.obey(["resume", "record", "stop"])
-    assert (feed.paused, feed.recording, feed.over) == (False, True, True)
 
 
 def test_frames_of_the_standard_input_are_inverted(folder, model, monkeypatch):
@@ -235,15 +228,31 @@ def test_frames_of_the_standard_input_are_inverted(folder, model, monkeypatch):
 
 
 def test_the_command_records_a_virtual_array(folder):
-    words = ("--simulate", "--rate", "20", "--unloaded", "1", "--seconds", "2", "--no-page", "--fault", "r2:3")
+    words = (
+        "--simulate",
+        "--rate",
+        "20",
+        "--unloaded",
+        "1",
+        "--seconds",
+        "2",
+        "--no-page",
+        "--fault",
+        "r2:3",
+        "--press",
+        "r2c3",
+    )
     code, _, text = run_all(folder, "bench", "array", "a.yaml", *words, "--record", "v.npz")
     assert code == 0
     assert "array of 5 x 6, capacitance" in text
+    assert "no press of 20 frames" in text
     found = read(folder / "v.npz", (5, 6), None)
     assert found.rest.sum() == 20
     assert np.abs(found.siemens.imag[0, 1, 3:]).max() < 1e-3 * np.abs(found.siemens.imag[0, 0, 0])  # the row is broken
     for wrong in ((), ("--port", "x", "--simulate"), ("--port", "x", "--kind", "hp-4284a")):
         assert run(folder, "bench", "array", "a.yaml", *wrong)[0] == 2
+    code, _, text = run_all(folder, "bench", "array", "a.yaml", "--simulate", "--press", "r9c3")
+    assert (code, "r9c3; expected r1c1 to r5c6" in text) == (2, True)
 
 
 def test_frames_of_another_array_are_refused(folder):
@@ -284,13 +293,3 @@ def test_a_known_press_names_swapped_wires(model, order, words):
 def test_a_swapped_row_and_a_swapped_column_are_both_named():
     pressed, largest = (np.repeat([[row], [column]], 20, axis=1) for row, column in ((2, 1), (4, 6)))
     assert swapped(pressed, largest).startswith("presses on r3 are read at r5, on c2 are read at c7: wires swapped")
-
-
-def test_the_command_names_swapped_wires_and_refuses_crossings_that_are_not_there(folder):
-    words = ("--simulate", "--rate", "50", "--unloaded", "2", "--seconds", "1", "--no-page", "--press")
-    code, _, text = run_all(folder, "bench", "array", "a.yaml", *words, "r2c3")
-    assert code == 0
-    assert "no press of 20 frames" in text
-    code, _, text = run_all(folder, "bench", "array", "a.yaml", *words, "r9c3")
-    assert code == 2
-    assert "r9c3; expected r1c1 to r5c6" in text

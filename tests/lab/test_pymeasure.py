@@ -100,7 +100,7 @@ def test_frequencies_of_an_lcr_meter_come_one_after_the_other():
 
 OTHERS = {
     "AgilentE4980": "TEKTRONIX,TDS 4980,C1,1.0", "Keithley2000": "TEKTRONIX,TDS 2000,0,1.0",
-    "HP34401A": "HEWLETT-PACKARD,4284A,34401,1", "Agilent4284A": "4284A", "Agilent34450A": "KEITHLEY,MODEL 34450,1,1",
+    "HP34401A": "HEWLETT-PACKARD,4284A,34401,1", "Agilent34450A": "KEITHLEY,MODEL 34450,1,1",
 }  # fmt: skip
 
 

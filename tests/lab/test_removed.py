@@ -3,9 +3,9 @@
 import shutil
 
 import pytest
-from laboratory import asked, laboratory
+from laboratory import done, laboratory
 
-from sensorgen.measure.lab import recorder, run
+from sensorgen.measure.lab import recorder
 from sensorgen.measure.lab.devices import SimulatedClock
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.bench import read_again
@@ -24,8 +24,7 @@ def run_and(remove, folder, at_s=12.5):
             remove.pop()(log_path)
 
     lab.clock.wait_until = waited
-    with Log(log_path, create=True) as log:
-        found = run.run(asked(), clock=lab.clock, log=log, rig=lab.rig, simulated=True)
+    found = done(folder, lab)
     lab.mechanism.advance(lab.clock.now() + 5)
     assert found.tip_up
     assert lab.mechanism.force_n == 0
@@ -56,13 +55,8 @@ def test_a_removed_log_is_an_error_and_the_next_run_logs_what_is_in_the_folder(t
         assert presses(log).force_n == pytest.approx([4.0, 2.0], abs=0.05)
 
 
-@pytest.mark.parametrize("everything", [False, True], ids=["its run", "all runs"])
-def test_a_removed_folder_is_an_error_and_the_readings_are_in_the_log(tmp_path, everything):
-    def remove(path):
-        home = recorder.home(path)
-        shutil.rmtree(home if everything else next(home.glob("*/")))
-
-    found, path = run_and([remove], tmp_path)
+def test_removed_folders_are_an_error_and_the_readings_are_in_the_log(tmp_path):
+    found, path = run_and([lambda path: shutil.rmtree(recorder.home(path))], tmp_path)
     assert found.end == "fault"
     assert "was removed during the run" in found.reason
     assert len(found.rows) == 1

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
-from fakes import fake_rig
-from laboratory import PLAN, asked, laboratory, outcome
+from fakes import fake_lab
+from laboratory import PLAN, done, laboratory, left_alone, outcome
 
 from sensorgen.cli import cli
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.measure.lab import recorder, run, safety
+from sensorgen.measure.lab import recorder, safety
 from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock
 from sensorgen.measure.lab.experiment import Choice
 from sensorgen.measure.log import Log
@@ -42,12 +42,6 @@ class Viewer:
         return due
 
 
-def done(folder, lab, **extra):
-    changes = extra.pop("changes", {})
-    with Log(folder / "log.db", create=True) as log:
-        return run.run(asked(**changes), clock=lab.clock, log=log, rig=lab.rig, simulated=True, **extra)
-
-
 def test_the_recording_in_the_log_has_the_presses_that_were_asked_for(tmp_path):
     found, lab = outcome(tmp_path)
     assert (found.end, found.done, found.steps) == ("done", 2, 2)
@@ -66,14 +60,17 @@ def test_the_recording_in_the_log_has_the_presses_that_were_asked_for(tmp_path):
     text = "\n".join(document.text(found.document()))
     assert "2 of 2 presses, simulated" in text
     assert json.loads(document.to_json(found))["end"] == "done"
+    assert (found.tip_up, found.problems) == (True, ())
+    left_alone(lab, 4.0)
+    assert lab.mechanism.motor_n == pytest.approx(0, abs=1e-3)  # a watchdog that is left behind would switch it on
 
 
 def test_a_pause_lifts_the_tip_and_the_press_is_done_again(tmp_path):
     lab = laboratory()
-    view = Viewer([(8.0, "pause"), (24.0, "resume")])
+    view = Viewer([(8.0, "pause"), (14.0, "resume")])
     found = done(tmp_path, lab, view=view)
     paused = [each for each in view.shown if each.message == "paused"]
-    assert paused[-1].time_s - paused[0].time_s > 10
+    assert paused[-1].time_s - paused[0].time_s > 4
     assert (found.end, found.done) == ("done", 2)
     assert lab.mechanism.violations == []
 
@@ -114,17 +111,17 @@ def test_abort_ends_with_the_tip_up_and_resume_does_the_rest(tmp_path):
 
 @pytest.mark.parametrize(
     ("stop", "reason"),
-    [({"presses": 1}, "stop.presses"), ({"minutes": 0.15}, "stop.minutes"), ({"drift": 1e-9}, "stop.drift")],
+    [({"minutes": 0.15}, "stop.minutes"), ({"drift": 1e-9}, "stop.drift")],  # presses: by the command
 )
 def test_rules_end_a_run(tmp_path, stop, reason):
-    found = done(tmp_path, laboratory(), changes={"stop": stop})
+    found = done(tmp_path, laboratory(), {"stop": stop})
     assert found.end == "rule"
     assert found.reason.startswith(reason)
     assert found.tip_up
 
 
 def test_an_absent_operator_ends_a_run(tmp_path):
-    found = done(tmp_path, laboratory(), changes={"limits": {"operator_min": 0.2}})
+    found = done(tmp_path, laboratory(), {"limits": {"operator_min": 0.2}})
     assert (found.end, found.tip_up) == ("abort", True)
     assert "operator" in found.reason
 
@@ -138,7 +135,7 @@ def test_presses_are_chosen_during_the_run_until_the_interval_is_reached(tmp_pat
 
     plan = [{"next": {"presses": 10}}]
     changes = {"plan": plan, "stop": {"interval": 0.3}}
-    found = done(tmp_path, laboratory(), changes=changes, next_press=choose)
+    found = done(tmp_path, laboratory(), changes, next_press=choose)
     assert asked_for == [((2.5, 97.5), k, True) for k in range(4)]
     assert (found.end, found.done) == ("done", 3)
     assert "stop.interval" in found.reason
@@ -147,7 +144,7 @@ def test_presses_are_chosen_during_the_run_until_the_interval_is_reached(tmp_pat
 def test_a_chosen_press_beyond_the_limits_is_refused(tmp_path):
     lab = laboratory()
     changes = {"plan": [{"next": {"presses": 3}}]}
-    found = done(tmp_path, lab, changes=changes, next_press=lambda *_: Choice(9.0, 20.0))
+    found = done(tmp_path, lab, changes, next_press=lambda *_: Choice(9.0, 20.0))
     assert found.end == "fault"
     assert "next press: 9 N" in found.reason
     assert lab.mechanism.peak_n < 1.0
@@ -178,7 +175,7 @@ def test_an_error_of_a_view_or_of_the_code_lifts_the_tip_before_it_is_seen(tmp_p
 
 def test_a_killed_attempt_is_logged_by_the_next_run_without_its_last_incomplete_row(tmp_path):
     (tmp_path / "a").mkdir()
-    first = done(tmp_path / "a", laboratory(), changes={"plan": PLAN[:1]})
+    first = done(tmp_path / "a", laboratory(), {"plan": PLAN[:1]})
     home = recorder.home(tmp_path / "b.db")
     folder = home / "20260101-000000"
     folder.mkdir(parents=True)
@@ -210,10 +207,8 @@ def test_a_run_that_goes_on_elsewhere_is_left_alone(tmp_path):
 
 def test_devices_of_any_kind_can_be_run(tmp_path):
     """Others' drivers, on a mechanism that shares no code with the simulators."""
-    clock = SimulatedClock()
-    rig, plant = fake_rig(clock)
-    with Log(tmp_path / "log.db", create=True) as log:
-        found = run.run(asked(), clock=clock, log=log, rig=rig, simulated=True)
+    lab = fake_lab()
+    found, plant = done(tmp_path, lab), lab.mechanism
     assert (found.end, found.done, plant.sideways, plant.above_s) == ("done", 2, 0, 0.0)
     assert 3.9 < plant.worst_n < 4.1
 
@@ -221,11 +216,11 @@ def test_devices_of_any_kind_can_be_run(tmp_path):
 @pytest.mark.parametrize(("position_mm", "up"), [(0.99, True), (1.01, False), (5.0, False)])
 def test_a_piston_that_sticks_below_its_upper_end_is_not_up(position_mm, up):
     """It answers and obeys nothing; the stage, which could raise it, was never started."""
-    clock = SimulatedClock()
-    rig, plant = fake_rig(clock)
+    lab = fake_lab()
+    rig, plant = lab.rig, lab.mechanism
     rig.started.add("actuator")
     rig.actuator.deaf, plant.extension_mm = True, position_mm
-    assert safety.made_safe(rig, clock) == (up, ())
+    assert safety.made_safe(rig, lab.clock) == (up, ())
     assert "actuator lift" in plant.sent
     assert (plant.on, plant.extension_mm) == (False, position_mm)
 
@@ -358,14 +353,11 @@ def test_a_specimen_that_cannot_be_simulated_is_refused_before_the_run(tmp_path)
 def test_faults_are_seen_by_the_fakes_too(tmp_path):
     """One of each device on the mechanism of the tests: both judges agree."""
     for role in ("actuator", "stage", "impedance"):
-        clock = SimulatedClock()
-        rig, plant = fake_rig(clock)
-        device = getattr(rig, role)
-        view = Viewer([])
+        lab = fake_lab()
+        plant, device, view = lab.mechanism, getattr(lab.rig, role), Viewer([])
         view.update = lambda sample, device=device: setattr(device, "dead", device.dead or sample.force_n > 3)
         (tmp_path / role).mkdir()
-        with Log(tmp_path / role / "log.db", create=True) as log:
-            found = run.run(asked(), clock=clock, log=log, rig=rig, simulated=True, view=view)
-        plant.advance(clock.now() + 5)
-        assert (found.end, found.tip_up, plant.tip_up, plant.sideways) == ("fault", True, True, 0)
+        found = done(tmp_path / role, lab, view=view)
+        plant.advance(lab.clock.now() + 5)
+        assert (found.end, found.tip_up, plant.above_mm > 5.0, plant.sideways) == ("fault", True, True, 0)
         assert role in found.reason

@@ -1,15 +1,14 @@
 """The actuator's own controller lifts the tip when run and guardian have ended together, or the computer sleeps."""
 
 import pytest
-from fakes import FakeActuator, fake_rig
-from laboratory import asked, laboratory
+from fakes import FakeActuator, fake_lab
+from laboratory import PLAN, done, laboratory, left_alone
 
 from lab.spring_plant import SpringPlant
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.lab import run, smac
 from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock
 from sensorgen.measure.lab.port import SimulatedPort
-from sensorgen.measure.log import Log
 from sensorgen.measure.virtual.smac import SmacController
 
 
@@ -23,17 +22,6 @@ class Killed(BaseException):
     """Run and guardian end at once: no sign of life is sent any more."""
 
 
-def left_alone(lab, seconds):
-    """Leave the mechanism without commands; time until its tip was last down [s]."""
-    begin = lab.clock.now()
-    last = begin
-    while lab.clock.now() < begin + seconds:
-        lab.clock.wait_until(lab.clock.now() + 0.005)
-        lab.simulators["actuator"].exchange(b"", lab.clock.now())
-        last = lab.clock.now() if lab.mechanism.force_n > 0 else last
-    return last - begin
-
-
 def killed_while_pressing(lab, folder, monkeypatch, **extra):
     """A run that ends without a word at 3 N, as by SIGKILL: nothing of it is carried out any more."""
     read = type(lab.rig.actuator).read
@@ -45,15 +33,15 @@ def killed_while_pressing(lab, folder, monkeypatch, **extra):
 
     monkeypatch.setattr(type(lab.rig.actuator), "read", dies)
     monkeypatch.setattr(run.safety, "made_safe", lambda *_: (_ for _ in ()).throw(Killed))
-    with Log(folder / "log.db", create=True) as log, pytest.raises(Killed):
-        run.run(asked(), clock=lab.clock, log=log, rig=lab.rig, simulated=True, **extra)
+    with pytest.raises(Killed):
+        done(folder, lab, **extra)
     assert lab.mechanism.force_n > 2.9
 
 
 def test_the_tip_is_up_two_seconds_after_the_last_sign(tmp_path, monkeypatch):
     lab = laboratory()
     killed_while_pressing(lab, tmp_path, monkeypatch)
-    assert left_alone(lab, 10.0) < 2.0
+    assert left_alone(lab, 4.0) < 2.0
     assert lab.mechanism.extension_mm == 0
     assert lab.mechanism.violations == []
 
@@ -62,17 +50,8 @@ def test_without_it_the_tip_stays_down(tmp_path, monkeypatch):
     """The fault that it is for, planted."""
     lab = laboratory()
     killed_while_pressing(lab, tmp_path, monkeypatch, watchdog=False)
-    assert left_alone(lab, 10.0) > 9.9
+    assert left_alone(lab, 4.0) > 3.9
     assert lab.mechanism.force_n > 2.9
-
-
-def test_a_whole_run_is_not_disturbed_and_leaves_no_watchdog_behind(tmp_path):
-    lab = laboratory()
-    with Log(tmp_path / "log.db", create=True) as log:
-        found = run.run(asked(), clock=lab.clock, log=log, rig=lab.rig, simulated=True)
-    assert (found.end, found.tip_up, found.problems) == ("done", True, ())
-    left_alone(lab, 10.0)
-    assert lab.mechanism.motor_n == pytest.approx(0, abs=1e-3)  # it would switch the motor on
 
 
 def test_a_computer_that_slept_finds_the_tip_up_and_ends_the_run():
@@ -124,11 +103,8 @@ def test_the_program_is_written_once_and_nobody_elses_is_replaced():
 
 
 def test_an_actuator_that_cannot_watch_is_refused_above_a_newton(tmp_path):
-    clock = SimulatedClock()
-    rig, plant = fake_rig(clock)
-    rig.actuator = Unwatched(plant, clock)
-    with Log(tmp_path / "log.db", create=True) as log:
-        with pytest.raises(BadInput, match=r"limits.force_n: 7 N, .* no watchdog: .* up to 1 N, or --no-watchdog"):
-            run.run(asked(), clock=clock, log=log, rig=rig, simulated=True)
-        found = run.run(asked(), clock=clock, log=log, rig=rig, simulated=True, watchdog=False)
-    assert found.end == "done"
+    lab = fake_lab()
+    lab.rig.actuator = Unwatched(lab.mechanism, lab.clock)
+    with pytest.raises(BadInput, match=r"limits.force_n: 7 N, .* no watchdog: .* up to 1 N, or --no-watchdog"):
+        done(tmp_path, lab)
+    assert done(tmp_path, lab, {"plan": PLAN[:1]}, watchdog=False).end == "done"

@@ -29,7 +29,7 @@ def gain_db(run, frequency, rate=RATE):
 
 
 @pytest.mark.parametrize("rate", [RATE, THESIS_RATE_HZ])
-@pytest.mark.parametrize("over", [0.2, 0.5, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("over", [0.5, 1.0, 4.0])
 def test_gain_is_that_of_the_closed_form_once_and_twice(rate, over):
     expected = response_db(over * CUTOFF_HZ, CUTOFF_HZ, rate)
     assert gain_db(Live(rate), over * CUTOFF_HZ, rate) == pytest.approx(expected, abs=2e-3, rel=4e-4)
@@ -124,6 +124,6 @@ def test_the_noise_of_the_last_reading_does_not_become_a_step():
     assert np.std(ends) < 3 * inner
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 20])
+@pytest.mark.parametrize("count", [1, 3, 20])
 def test_few_samples_pass(count):
     assert lowpass.offline(np.full((count, 2), 3.0 + 1j), RATE) == pytest.approx(np.full((count, 2), 3.0 + 1j))

@@ -54,8 +54,7 @@ def test_presses_are_found_in_readings_that_creep(begins_s, least_n):
     assert len(found) == sum(right)
 
 
-@pytest.mark.parametrize("ramp_s", [1e-3, 0.2])
-@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-5, 1e-3])
+@pytest.mark.parametrize(("noise", "ramp_s"), [(0.0, 0.2), (1e-6, 1e-3), (1e-5, 0.2), (1e-3, 1e-3)])
 def test_equal_presses_are_found_however_quiet_the_readings_are(noise, ramp_s):
     t, rng = np.arange(0, 120, 0.02), np.random.default_rng(2)
     starts = np.array([10.0, 30, 50, 70, 90, 105])
@@ -128,9 +127,7 @@ def test_means_of_readings_that_hang_together_have_larger_errors():
 
 LAWS = {
     "power": lambda t, _: 0.02 * (t / 60) ** 0.3,
-    "steep power": lambda t, _: 0.02 * (t / 60) ** 0.7,
     "stretched exponential": lambda t, _: 0.04 * (1 - np.exp(-((t / 40) ** 0.5))),
-    "exponential": lambda t, _: 0.04 * (1 - np.exp(-t / 40)),
     "a room that warms and cools": lambda t, _: 0.02 * np.sin(t / 40),
 }
 
@@ -174,7 +171,6 @@ def test_drift_is_fitted_to_the_rest_and_taken_out():
         (lambda t, _: 0.02 * t / t[-1], "line"),
         (LAWS["power"], "smooth"),
         (made.answering(0.01, 2.0), "memory"),
-        (lambda t, f: made.answering(0.01, 2.0)(t, f) + made.answering(0.01, 30.0)(t, f), "memory"),
         (made.walking(0.02), "wandering"),
         (lambda t, f: made.answering(0.03, 2.0)(t, f) + made.walking(0.02)(t, f), "memory+wandering"),
     ],
@@ -193,6 +189,7 @@ def test_time_constants_of_a_film_come_back():
     force = run.force_n.copy()
     force[500:600] = np.nan  # the rig was silent
     found = drift_of(run, force)
+    assert found.law == "memory"
     taus = sorted(term.tau_s for term in found.fit.terms if isinstance(term, drift.Relaxation))
     assert taus[:2] == pytest.approx([2, 30], rel=0.05)
     off = (found.at(run.time_s) - run.drift)[force > 0.4]
@@ -224,12 +221,11 @@ def test_hysteresis_of_two_known_ways():
     assert found.share == pytest.approx([2.0 / 16, 0], abs=2e-3)  # 0.5 F (4 - F) has its top of 2 at 2 N
     assert found.at_n[0] == pytest.approx(2, abs=0.1)
     assert found.lost == pytest.approx([0.5 * 64 / 6 / (64 / 3), 0], abs=5e-3)
-    noise = np.random.default_rng(0).standard_normal((400, 2)) * 0.1
     several = [hysteresis(force, values + 0.1 * np.random.default_rng(k).standard_normal((400, 2))) for k in range(40)]
     apart = np.array([way.down[20] - way.up[20] for way in several])
     spans = np.array([np.ptp(np.vstack([way.up, way.down]), axis=0) for way in several]).mean(axis=0)
     np.testing.assert_allclose(np.mean([way.error for way in several], axis=0), apart.std(axis=0) / spans, rtol=0.35)
-    assert hysteresis(force, values + noise).share == pytest.approx([2 / 16, 0], abs=0.06)
+    assert several[0].share == pytest.approx([2 / 16, 0], abs=0.06)
     with pytest.raises(BadInput, match="expected a press with loading and unloading"):
         hysteresis(force[:200], values[:200])
 
@@ -285,9 +281,9 @@ def test_hysteresis_is_no_late_clock_and_its_error_has_that_of_the_clock():
         assert way.error[1] == pytest.approx(2 * 0.05 / 5.8, rel=0.25)
 
 
-@pytest.mark.parametrize(("lens", "noise_n"), [(0.0, 0.001), (0.1, 0.001), (0.0, 0.03)])
+@pytest.mark.parametrize(("lens", "noise_n"), [(0.1, 0.001), (0.0, 0.03)])
 def test_equal_loads_of_a_film_that_is_steep_at_first_tell_its_hysteresis(lens, noise_n):
-    one, log = slow_loads(29, 8, 0.75, lens, noise_n)  # as like itself half a period late as in time
+    one, log = slow_loads(29, 5, 0.75, lens, noise_n)  # as like itself half a period late as in time
     beside = joined(one, log)
     assert beside.clocks.offset_s == pytest.approx(2, abs=0.04)  # a row of the rig
     for way in of_presses(processed(one, beside, law="line")).ways.values():

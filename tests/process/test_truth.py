@@ -12,7 +12,10 @@ from sensorgen.prediction.identifiability.fisher import bounds, slopes
 from sensorgen.prediction.inverse.estimator import Estimator
 
 NOISE, RATE = 1e-3, 140.0
-MADE = made.presses(60, dwell_s=3.0, rest_s=3.0, seed=11)
+OF_A_MEAN = NOISE / np.sqrt(WINDOW_S * RATE)
+MADE = made.presses(40, dwell_s=3.0, rest_s=3.0, seed=11)
+FORCE_N, AT_M = np.array([m[2] for m in MADE]), np.array([m[3] for m in MADE]) * 1e-3
+REST_OHM = made.sensor().impedance(made.TONES_HZ, 0.0, 0.05)
 
 
 @pytest.fixture(scope="module")
@@ -28,15 +31,23 @@ def run(tmp_path_factory):
     return made.joined(made.read(folder / "run.mat"), log)
 
 
-@pytest.fixture(scope="module")
-def pairs(run):
+def pressed(run, readings_ohm):
+    """Pairs of the run, of other readings in place of its own."""
     one = run.recording
-    found = drift.fitted(one.time_s, one.impedance_ohm, one.valid(), run.force_n)
-    clean = found.removed(one.time_s, one.impedance_ohm)
     spans = presses.by_force(one.time_s, run.force_n)
-    # relative to the rest: what the model of the sensor has there
-    clean *= made.sensor().impedance(made.TONES_HZ, 0.0, 0.05) / found.rest_ohm()
-    return presses.pairs(one.time_s, clean, one.valid(), spans, run.force_n, run.set_position_mm)
+    return presses.pairs(one.time_s, readings_ohm, one.valid(), spans, run.force_n, run.set_position_mm)
+
+
+def over_bounds(pressed_ohm, noise=OF_A_MEAN):
+    """Errors of force and position over their Cramer-Rao bounds."""
+    limits = bounds(slopes(made.sensor(), made.TONES_HZ, FORCE_N, AT_M), noise)
+    assert np.median(limits.position_m) < 3e-3  # or it would say nothing
+    found = Estimator(made.sensor(), made.TONES_HZ, noise).batch(pressed_ohm)
+    return (found.force_n - FORCE_N) / limits.force_n, (found.position_m - AT_M) / limits.position_m
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def test_clocks_and_marks(run):
@@ -48,46 +59,28 @@ def test_clocks_and_marks(run):
     assert 3 <= counts["rig error"] <= 400
 
 
-def test_force_and_position_come_back_as_well_as_they_can(pairs):
+def test_force_and_position_come_back_as_well_as_they_can(run):
+    one = run.recording
+    found = drift.fitted(one.time_s, one.impedance_ohm, one.valid(), run.force_n)
+    clean = found.removed(one.time_s, one.impedance_ohm)
+    # relative to the rest: what the model of the sensor has there
+    pairs = pressed(run, clean * REST_OHM / found.rest_ohm())
     assert len(pairs.time_s) == len(MADE)
-    force, at_mm = np.array([m[2] for m in MADE]), np.array([m[3] for m in MADE])
-    np.testing.assert_allclose(pairs.position_mm, at_mm, atol=1e-3)  # as the rig was told
-    noise = NOISE / np.sqrt(WINDOW_S * RATE)
-    limits = bounds(slopes(made.sensor(), made.TONES_HZ, force, at_mm * 1e-3), noise)
-    found = Estimator(made.sensor(), made.TONES_HZ, noise).batch(pairs.pressed_ohm)
-    pull_force = (found.force_n - force) / limits.force_n
-    pull_at = (found.position_m - at_mm * 1e-3) / limits.position_m
-    assert 0.7 < np.sqrt(np.mean(pull_force**2)) < 1.5
-    assert 0.7 < np.sqrt(np.mean(pull_at**2)) < 1.5
+    np.testing.assert_allclose(pairs.position_mm, AT_M * 1e3, atol=1e-3)  # as the rig was told
+    pull_force, pull_at = over_bounds(pairs.pressed_ohm)
+    assert 0.7 < rms(pull_force) < 1.5
+    assert 0.7 < rms(pull_at) < 1.5
     assert np.abs(pull_force).max() < 4.5
-    assert np.median(limits.position_m) < 2e-3  # or the test would say nothing
     assert GUARD_S < 1
 
 
-def test_without_taking_the_drift_out_they_do_not(run):
-    one = run.recording
-    spans = presses.by_force(one.time_s, run.force_n)
-    raw = presses.pairs(one.time_s, one.impedance_ohm, one.valid(), spans, run.force_n, run.set_position_mm)
-    noise = NOISE / np.sqrt(WINDOW_S * RATE)
-    force, at_m = np.array([m[2] for m in MADE]), np.array([m[3] for m in MADE]) * 1e-3
-    limits = bounds(slopes(made.sensor(), made.TONES_HZ, force, at_m), noise)
-    found = Estimator(made.sensor(), made.TONES_HZ, noise).batch(raw.pressed_ohm)
-    assert np.sqrt(np.mean(((found.force_n - force) / limits.force_n) ** 2)) > 5
-
-
-def test_quotients_of_pairs_are_free_of_most_of_the_drift_without_a_fit(run):
+def test_without_taking_the_drift_out_they_do_not_but_quotients_of_pairs_are_free_of_most_of_it(run):
     """Between before and under a press drift has moved little, though more than the noise."""
-    one = run.recording
-    spans = presses.by_force(one.time_s, run.force_n)
-    raw = presses.pairs(one.time_s, one.impedance_ohm, one.valid(), spans, run.force_n, run.set_position_mm)
-    z = made.sensor().impedance(made.TONES_HZ, 0.0, 0.05) * raw.pressed_ohm / raw.before_ohm
+    raw = pressed(run, run.recording.impedance_ohm)
+    assert rms(over_bounds(raw.pressed_ohm)[0]) > 5
     noise = NOISE * np.sqrt(2 / (WINDOW_S * RATE))
-    force, at_m = np.array([m[2] for m in MADE]), np.array([m[3] for m in MADE]) * 1e-3
-    limits = bounds(slopes(made.sensor(), made.TONES_HZ, force, at_m), noise)
-    found = Estimator(made.sensor(), made.TONES_HZ, noise).batch(z)
-    without = Estimator(made.sensor(), made.TONES_HZ, noise).batch(raw.pressed_ohm)
-    rms, drifting = (np.sqrt(np.mean(((e.force_n - force) / limits.force_n) ** 2)) for e in (found, without))
-    assert rms < drifting / 5
+    quotients = over_bounds(REST_OHM * raw.pressed_ohm / raw.before_ohm, noise)[0]
+    assert rms(quotients) < rms(over_bounds(raw.pressed_ohm, noise)[0]) / 5
 
 
 @pytest.mark.parametrize("law", [lambda t, _: 0.02 * (t / 60) ** 0.3, lambda t, _: 0.02 * np.sin(t / 100)])
@@ -116,9 +109,4 @@ def off_over_bound(law, among=tuple(drift.LAWS)):
     clean = fit.removed(truth.time_s, truth.impedance_ohm) * truth.clean_ohm[0] / fit.rest_ohm()
     spans = presses.by_force(truth.time_s, truth.force_n)
     found = presses.pairs(truth.time_s, clean, every, spans, truth.force_n, truth.position_mm)
-    noise = NOISE / np.sqrt(WINDOW_S * RATE)
-    force, at_m = np.array([m[2] for m in MADE]), np.array([m[3] for m in MADE]) * 1e-3
-    limits = bounds(slopes(made.sensor(), made.TONES_HZ, force, at_m), noise)
-    back = Estimator(made.sensor(), made.TONES_HZ, noise).batch(found.pressed_ohm)
-    off = (back.force_n - force) / limits.force_n, (back.position_m - at_m) / limits.position_m
-    return [float(np.sqrt(np.mean(o**2))) for o in off]
+    return [rms(off) for off in over_bounds(found.pressed_ohm)]

@@ -24,7 +24,7 @@ from sensorgen.measure.signal.verdicts import (
 from sensorgen.models import line
 
 
-@pytest.mark.parametrize("leak", [1e-12, 1e-6, 1e-3, 0.1, 10.0])
+@pytest.mark.parametrize("leak", [1e-12, 1e-3, 10.0])
 def test_the_leak_is_that_of_the_line_model(leak):
     changes = {"bottom_resistivity_ohm_m": 0.07, "force_n": 0.0, "frequency_hz": 1e-9, "leak_s_per_m": leak / 0.1}
     z = line.impedance(line.PressedLine(**PLATE | changes))
@@ -89,7 +89,7 @@ def test_a_verdict_carries_its_numbers():
         verdict(Evidence("z", (nan,)))
 
 
-@pytest.mark.parametrize(("count", "total"), [(0, 1), (0, 59), (3, 10), (59, 59), (20, 1000)])
+@pytest.mark.parametrize(("count", "total"), [(0, 1), (59, 59), (20, 1000)])
 def test_intervals_are_those_of_scipy(count, total):
     found = share(count, total)
     exact = stats.binomtest(count, total).proportion_ci(0.95, "exact")
@@ -101,7 +101,7 @@ def test_intervals_hold_at_least_their_confidence_where_wilsons_do_not():
         inside = [low <= p <= high for low, high in intervals]
         return stats.binom.pmf(np.arange(len(intervals)), len(intervals) - 1, p)[inside].sum()
 
-    for total in (5, 12, 59):
+    for total in (5, 59):
         ours = [(share(k, total).low, share(k, total).high) for k in range(total + 1)]
         wilson = [stats.binomtest(k, total).proportion_ci(0.95, "wilson") for k in range(total + 1)]
         at = np.linspace(0.005, 0.995, 199)
@@ -109,7 +109,7 @@ def test_intervals_hold_at_least_their_confidence_where_wilsons_do_not():
         assert min(coverage(wilson, p) for p in at) < 0.94
 
 
-@pytest.mark.parametrize("table", [[(8, 2), (1, 5)], [(28, 5), (12, 14)], [(0, 3), (4, 0)], [(10, 10), (10, 10)]])
+@pytest.mark.parametrize("table", [[(28, 5), (12, 14)], [(0, 3), (4, 0)], [(10, 10), (10, 10)]])
 def test_two_groups_are_fishers_test(table):
     assert independence(table) == pytest.approx(stats.fisher_exact(np.array(table)).pvalue, rel=1e-9)
 
