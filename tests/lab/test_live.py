@@ -88,7 +88,7 @@ def test_values_move_and_keys_and_buttons_command_the_run(page, view):
     assert len(before) == 6 + 14
     assert page.run("document.title") == "tri 0.1 mm, random presses"
     feed(view, 200, 400)
-    page.until("document.getElementById('step')?.textContent === '6 of 30'")
+    page.until("page.rows.at(-1)[0] === 19.95 && document.getElementById('step').textContent === '6 of 30'")
     after = page.run("[...document.querySelectorAll('dd, .value, .residual')].map(e => e.textContent)")
     assert all(a != b for a, b in zip(before[6:], after[6:], strict=True))
     assert after[-1].startswith("residual 0.")

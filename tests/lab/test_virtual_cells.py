@@ -188,7 +188,7 @@ def test_the_part_that_mirrors_repeat_is_solved():
 
 def test_finer_bricks_converge_in_the_order_that_extrapolates_them():
     scene = quarter()
-    c = [capacitance(of, EPS, of.at_m) for of in (bricks(scene, NUMBERS, 0.25, 200, n) for n in (1, 2, 4))]
+    c = [capacitance(of, EPS, of.at_m) for of in (bricks(scene, NUMBERS, 0.175, 500, n) for n in (1, 2, 4))]
     assert 2**ORDER * 0.85 < (c[0] - c[1]) / (c[1] - c[2]) < 2**ORDER * 1.4
 
 

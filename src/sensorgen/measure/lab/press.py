@@ -219,9 +219,11 @@ class Loop:
         """A row of the rig; free of the specimen there is no force on it, whatever friction makes the motor do."""
         free = not self.down or self.extension.position_mm < self.down_mm - _FREE_MM
         force = nan if free else self.extension.force_n
-        self.recorder.state(0.0 if free or not isfinite(self.set_n) else self.set_n, self._known_place(), force)
+        self.recorder.state(0.0 if free or not isfinite(self.set_n) else self.set_n, self.known_place_mm, force)
 
-    def _known_place(self) -> float:
+    @property
+    def known_place_mm(self) -> float:
+        """Place that the stage was sent to; 0 before [mm]."""
         return self.wanted_mm if isfinite(self.wanted_mm) else 0.0
 
     def _show(self) -> None:
@@ -230,7 +232,7 @@ class Loop:
         force, set_n = (self.extension.force_n, self.set_n) if isfinite(self.set_n) else (0.0, 0.0)
         predicted = None
         if self.predicted and isfinite(self.set_n) and force > 0:
-            predicted = self.predicted(force, self._known_place(), self.rest_ohm)
+            predicted = self.predicted(force, self.known_place_mm, self.rest_ohm)
         self.view.update(
             Sample(
                 self.clock.now() - self.begun_s, self.step, self.steps, self.message, force,

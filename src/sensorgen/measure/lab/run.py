@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
-from math import ceil, isfinite
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -357,8 +357,7 @@ class _Attempt:
                   "late periods": loop.late}  # fmt: skip
         failed = list(problems)
         try:
-            place_mm = loop.wanted_mm if isfinite(loop.wanted_mm) else 0.0
-            recording.state(0.0, place_mm, float("nan"), reason if end == "fault" else "")
+            recording.state(0.0, loop.known_place_mm, float("nan"), reason if end == "fault" else "")
             recording.journal.note("ended", attempt=self.number, end=end, reason=reason, tip_up=up, problems=problems,
                               counts=counts)  # fmt: skip
         except SensorgenError as error:

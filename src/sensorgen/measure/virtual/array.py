@@ -24,6 +24,7 @@ REST, STEP = 5, 60  # frames
 RATE_HZ = 100.0
 _SCATTER = 0.05
 _FULL_KPA = 100.0
+_CREEP_S = 100.0
 _LEAK_S = 1e-15  # of every node to ground: a node that nothing joins has a potential
 # Heel, lateral and medial metatarsals, hallux: middle and radius along and across the foot, share of the peak [-]
 _LOBES = (
@@ -106,9 +107,7 @@ class VirtualArray:
     play : float
         By which unloading lags behind loading, half of it each way, over the largest pressure before [-].
     creep : float
-        Share of the pressure that is felt with ``creep_s`` only [-].
-    creep_s : float
-        Time constant [s].
+        Share of the pressure that is felt with a delay of 100 s only [-].
     drift : float
         Of the gain [1/d].
     """
@@ -118,7 +117,6 @@ class VirtualArray:
     spread: Callable[[Real], Real]
     play: float = 0.0
     creep: float = 0.0
-    creep_s: float = 100.0
     drift: float = 0.0
 
     def frames(
@@ -131,7 +129,7 @@ class VirtualArray:
         for k, (load, elapsed) in enumerate(zip(pressure_kpa, np.diff(time_s, prepend=time_s[0]), strict=True)):
             most = np.maximum(most, load)
             play = np.clip(play, load - self.play * most, load + self.play * most)
-            slow = slow + (load - slow) * -np.expm1(-elapsed / self.creep_s)
+            slow = slow + (load - slow) * -np.expm1(-elapsed / _CREEP_S)
             felt = (1 - self.creep) * (load + play) / 2 + self.creep * slow
             ratio = 1 + np.exp(self.drift * day) * self.rise(felt)
             found[k] = nodal(self.tracks, self.tracks.capacitance_f * ratio, readout)
