@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
-from sensorgen.design import design, printer
+from sensorgen.design import design, packs
 from sensorgen.design.design import make, name_of
 from sensorgen.design.shapes import reference
 from sensorgen.prediction.bodies import drawn
@@ -71,7 +71,7 @@ def test_a_changed_value_in_a_material_changes_the_id(monkeypatch):
 
 
 def test_the_place_of_a_printers_file_does_not_change_the_id(tmp_path):
-    shipped = (printer.folder() / "printers/diabase-h5.yaml").read_text("utf-8")
+    shipped = (packs.profiles() / "printers/diabase-h5.yaml").read_text("utf-8")
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "own.yaml").write_text(shipped)
@@ -95,7 +95,7 @@ def test_long_names_are_cut_but_stay_apart():
 @pytest.mark.parametrize("stem", ["my printer", "größe", "...", "-x-", "a" * 200])
 def test_names_made_from_odd_file_names_are_safe(tmp_path, stem):
     path = tmp_path / f"{stem}.yaml"
-    path.write_text((printer.folder() / "printers/diabase-h5.yaml").read_text("utf-8"))
+    path.write_text((packs.profiles() / "printers/diabase-h5.yaml").read_text("utf-8"))
     name = tri(printer=str(path)).name
     assert tri(name=name).name == name
 

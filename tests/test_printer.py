@@ -5,7 +5,7 @@ import re
 import pytest
 
 from sensorgen.core.errors import BadInput, UnknownName
-from sensorgen.design import printer
+from sensorgen.design import packs, printer
 
 
 @pytest.fixture
@@ -13,7 +13,7 @@ def own(tmp_path):
     """A printer file of the user's, with a change to one that ships."""
 
     def write(old, new):
-        text = (printer.folder() / "printers/diabase-h5.yaml").read_text("utf-8")
+        text = (packs.profiles() / "printers/diabase-h5.yaml").read_text("utf-8")
         assert old in text
         path = tmp_path / "own.yaml"
         path.write_text(text.replace(old, new), "utf-8")
@@ -79,7 +79,7 @@ def test_unknown_names(load, word):
     ],
 )
 def test_a_bad_printer_file_is_told_in_our_words(tmp_path, change, said):
-    text = (printer.folder() / "printers/diabase-h5.yaml").read_text("utf-8")
+    text = (packs.profiles() / "printers/diabase-h5.yaml").read_text("utf-8")
     key = change.partition(":")[0]
     path = tmp_path / "own.yaml"
     path.write_text(

@@ -20,7 +20,7 @@ from filled import filled
 
 from sensorgen.core.errors import BadInput, SlicerFailed, UnknownName, Unwritable
 from sensorgen.design.design import make
-from sensorgen.design.printer import folder
+from sensorgen.design.packs import profiles as folder
 from sensorgen.export import slicing, threemf
 from sensorgen.export.gcode import motion as paths
 from sensorgen.export.gcode.check import check, report

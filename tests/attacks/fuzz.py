@@ -148,7 +148,7 @@ def logged(folder):
 
 def samples(folder):
     """Whole files by kind, with their readers."""
-    from sensorgen.design import printer
+    from sensorgen.design import packs, printer
     from sensorgen.measure.readings import readings
     from sensorgen.workflows import api
     from sensorgen.workflows.batch import plan
@@ -160,7 +160,7 @@ def samples(folder):
     (folder / "whole.invert").write_bytes((folder / "whole.csv").read_bytes())
     (folder / "whole.gcode").write_text(good.MAKER)
     for kind, name in (("printer", "printers/diabase-h5"), ("quality", "qualities/fine")):
-        (folder / f"whole.{kind}").write_bytes((printer.folder() / f"{name}.yaml").read_bytes())
+        (folder / f"whole.{kind}").write_bytes((packs.profiles() / f"{name}.yaml").read_bytes())
     (folder / "whole.design").write_bytes((ROOT / "designs/23/sqxy-d0.1.yaml").read_bytes())
     (folder / "whole.plan").write_text(runpy.run_path(str(ROOT / "tests/batch/conftest.py"))["SMALL"])
 

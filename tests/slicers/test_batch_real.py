@@ -178,7 +178,7 @@ def test_twenty_sensors_in_one_file(twenty):
 def test_skirt_and_tower_stay_on_the_bed_and_off_the_specimens(twenty):
     batch, _ = twenty
     everything = paths.read(batch.folder / "film-study.prusa.gcode", MACHINE)
-    ways = everything.chosen(everything.length_mm() > 0)
+    ways = everything.of(everything.length_mm() > 0)
     half = np.array(MACHINE.bed_mm) / 2
     assert (np.abs(ways.end_mm[:, :2]) <= half).all()
     names = np.array(ways.kinds)[ways.kind]

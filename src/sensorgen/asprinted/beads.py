@@ -13,7 +13,7 @@ import shapely
 from numpy.typing import NDArray
 
 from sensorgen.checks.estimate import ROUND
-from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.core.arrays import Columns, Real, Whole, parts_of
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.motion import Paths, follow, paths_of
@@ -34,7 +34,7 @@ _LEVEL_MM = 0.01  # a line belongs to a layer whose top it is this near
 
 
 @dataclass(frozen=True, eq=False)
-class Beads:
+class Beads(Columns):
     """The lines of one piece, from its corner [mm]; ``body`` counts in the bodies of its scene.
 
     Attributes
@@ -73,10 +73,6 @@ class Beads:
     def widths_mm(self, convention: str) -> Real:
         """Width of each line by a convention [mm]."""
         return self.width_mm + ROUND * self.height_mm if convention == "stadium" else self.width_mm
-
-    def of(self, rows: Mask) -> "Beads":
-        """The lines of a mask."""
-        return Beads(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
 def beads(design: Design, paths: "Paths", centre_mm: Point | None = None, *, cut: bool = True) -> Beads:
@@ -444,8 +440,8 @@ def connected(start_mm: Real, end_mm: Real) -> Whole:
     start_mm, end_mm = (np.clip(place, -_FAR_MM, _FAR_MM) for place in (start_mm, end_mm))
     way = end_mm - start_mm
     count = np.maximum(np.ceil(np.abs(way).max(1) / _CELL_MM), 1).astype(np.int64) + 1
-    which = np.repeat(np.arange(len(count)), count)
-    share = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)) / (count[which] - 1)
+    which, step = parts_of(count)
+    share = step / (count[which] - 1)
     cell = np.floor((start_mm[which] + share[:, None] * way[which]) / _CELL_MM).astype(np.int64)
     x, y = (cell - cell.min(0, initial=0)).T
     column = y.max(initial=0) + 2

@@ -16,7 +16,7 @@ import shapely
 
 from sensorgen.asprinted.beads import Beads
 from sensorgen.checks import estimate
-from sensorgen.core.arrays import Mask, Real
+from sensorgen.core.arrays import Mask, Real, parts_of
 from sensorgen.core.findings import runs
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.results import GcodeFinding
@@ -174,16 +174,12 @@ def deposit(lines: Beads, shape: tuple[int, ...]) -> Real:
     along, aside = way / (long * PITCH_MM)[:, None], across / (wide * PITCH_MM)[:, None]
     corner = (lines.start_mm - across / 2) / PITCH_MM + (along + aside) / 2 + _MARGIN - 0.5
     for lot in np.array_split(np.arange(len(counts)), counts.sum() // _LOT + 1):
-        count = counts[lot]
-        step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        many, share = np.repeat(wide[lot], count), np.repeat(shares[lot], count)
+        which, step = parts_of(counts[lot])
+        line = lot[which]
+        many, share = wide[line], shares[line]
         row = step // many
         column = step - row * many
-        x, y = (
-            np.repeat(corner[lot, k], count) + row * np.repeat(along[lot, k], count)
-            + column * np.repeat(aside[lot, k], count)
-            for k in (0, 1)
-        )  # fmt: skip
+        x, y = (corner[line, k] + row * along[line, k] + column * aside[line, k] for k in (0, 1))
         inside = (x >= 0) & (y >= 0) & (x < shape[0] - 1) & (y < shape[1] - 1)
         if not inside.all():
             x, y, share = x[inside], y[inside], share[inside]
@@ -203,8 +199,8 @@ def _cover(regions: Sequence[Region], shape: tuple[int, ...]) -> Real:
     (x0, y0), (x1, y1) = (points[edge + k].T / PITCH_MM + _MARGIN for k in (0, 1))
     ends = [np.ceil(_ROWS * f(x0, x1) - 0.5).astype(np.int64) for f in (np.minimum, np.maximum)]
     first, last = (np.clip(end, 0, _ROWS * shape[0]) for end in ends)
-    which = np.repeat(np.arange(len(edge)), last - first)
-    row = np.arange(len(which)) - np.repeat(np.cumsum(last - first) - last, last - first)
+    which, step = parts_of(last - first)
+    row = first[which] + step
     share = ((row + 0.5) / _ROWS - x0[which]) / (x1 - x0)[which]
     y = np.clip(y0[which] + share * (y1 - y0)[which], 0, shape[1] - 1e-9)
     cell, sign = row // _ROWS * (shape[1] + 1) + y.astype(np.int64), np.sign(x1 - x0)[which]
@@ -337,8 +333,8 @@ def _over_nothing(lines: Beads, below: Real) -> tuple[float, float]:
     way = lines.end_mm - lines.start_mm
     length = np.hypot(*way.T)
     count = np.clip(np.ceil(length / _STEP_MM), 1, _MOST_CELLS).astype(np.int64)
-    which = np.repeat(np.arange(len(count)), count)
-    share = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[which]
+    which, step = parts_of(count)
+    share = (step + 0.5) / count[which]
     cell = ((lines.start_mm[which] + share[:, None] * way[which]) / PITCH_MM + _MARGIN).astype(np.int64)
     x, y = np.clip(cell, 0, np.array(below.shape) - 1).T
     return float((length / count)[which][below[x, y] < _UNSUPPORTED].sum()), float(length.sum())

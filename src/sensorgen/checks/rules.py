@@ -45,7 +45,7 @@ def grid_findings(scene: Scene, layers: Layers) -> Iterator[Finding]:
 
 def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
     levels = faces_mm(body)
-    off = sorted(z for z in levels if layers.off_grid_mm(z) > TOUCH_MM)
+    off = sorted(z for z in levels if min(abs(z - b) for b in layers.boundaries_mm) > TOUCH_MM)
     if not off:
         return
     low, high = min(levels), max(levels)
@@ -200,8 +200,8 @@ def _printed_gaps(pair: Pair, slices: Slices, printer: Printer) -> dict[float | 
     }
     by_gap: dict[float | None, list[str]] = {}
     for walls, least in widths.items():
-        low, high = (slices.printed_layers(body, least) for body in pair)
-        boundaries = slices.layers.boundaries_mm
+        boundaries, count = slices.layers.boundaries_mm, len(slices.layers)
+        low, high = ([k for k in range(count) if not slices.printed(body, k, least).is_empty] for body in pair)
         gap = round(boundaries[high[0]] - boundaries[low[-1] + 1], 9) if low and high else None
         by_gap.setdefault(gap, []).append(walls)
     return by_gap

@@ -47,10 +47,6 @@ class Layers:
         """Height at which a face drawn at ``z_mm`` comes out: the boundary after the last sample up to it [mm]."""
         return self.boundaries_mm[min(bisect_left(self.mids_mm, z_mm + TOUCH_MM), len(self))]
 
-    def off_grid_mm(self, z_mm: float) -> float:
-        """Distance of a height from the nearest boundary [mm]."""
-        return min(abs(z_mm - b) for b in self.boundaries_mm)
-
 
 class Slices:
     """Every body in every layer: cut once, asked by all rules. Layers are counted from 0."""
@@ -78,10 +74,6 @@ class Slices:
             pieces = shapely.get_parts(region)
             self._wider[key] = shapely.multipolygons(pieces[narrow_mm(pieces) > least_mm + TOUCH_MM])
         return self._wider[key]
-
-    def printed_layers(self, body: Body, least_mm: float) -> list[int]:
-        """Layers in which some part of a body is wider than ``least_mm``."""
-        return [k for k in range(len(self.layers)) if not self.printed(body, k, least_mm).is_empty]
 
 
 # As shares of the nozzle.

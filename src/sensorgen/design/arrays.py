@@ -13,16 +13,29 @@ With ``pads: left`` the print is exchanged in x and y.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import ceil
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.design.effects import TipData
-from sensorgen.design.tip import EVEN
+from sensorgen.design.tip import EVEN, TipData
 from sensorgen.scene.lettering import LINE_DOTS, runs
-from sensorgen.scene.scene import SLIVER_MM, Body, Envelope, Fill, Move, Piece, Point, Prism, Scene, box, rounded
+from sensorgen.scene.scene import (
+    SLIVER_MM,
+    Body,
+    Envelope,
+    Fill,
+    Move,
+    Piece,
+    Point,
+    Prism,
+    Scene,
+    box,
+    choice,
+    parameter,
+    rounded,
+)
 
 if TYPE_CHECKING:
     import shapely
@@ -41,86 +54,45 @@ _TRACK, _PERIOD_MM = 0.8, 2.0  # most of a track's width over its pitch, and its
 class Params(Envelope):
     """Parameters of an array of crossing tracks."""
 
-    length_mm: float = field(
-        default=60.0, metadata={"help": "Length of the sensing area, along the rows.", "range": (1.0, 1000.0)}
+    length_mm: float = parameter(60.0, "Length of the sensing area, along the rows.", 1.0, 1000.0)
+    width_mm: float = parameter(60.0, "Width of the sensing area, along the columns.", 1.0, 1000.0)
+    isolation_mm: float = parameter(0.4, "Cover over the columns; 0 leaves it out.", 0.0, 10.0)
+    pitch_x_mm: float = parameter(10.0, "Distance from column to column.", 0.5, 200.0)
+    pitch_y_mm: float = parameter(10.0, "Distance from row to row.", 0.5, 200.0)
+    columns: float = parameter(0.0, "Number of columns, evenly spread; 0: by pitch_x.", 0.0, 1000.0, count=True)
+    rows: float = parameter(0.0, "Number of rows, evenly spread; 0: by pitch_y.", 0.0, 1000.0, count=True)
+    column_mm: float = parameter(0.0, "Width of a column; 0: four fifths of the pitch, in steps of 2 mm.", 0.0, 200.0)
+    row_mm: float = parameter(0.0, "Width of a row; 0: four fifths of the pitch, in steps of 2 mm.", 0.0, 200.0)
+    base_mm: float = parameter(0.4, "Isolation under the rows; 0 leaves it out.", 0.0, 10.0)
+    connector_mm: float = parameter(2.54, "Distance of the pads, and of the leads.", 0.5, 50.0)
+    lead_mm: float = parameter(1.8, "Width of leads and pads.", 0.2, 50.0)
+    pad_mm: float = parameter(6.0, "Length of the pads.", 1.0, 50.0)
+    margin_mm: float = parameter(2.5, "Edge around tracks and leads.", 0.2, 50.0)
+    cover_mm: float = parameter(
+        0.0, "Thickness of a sheet that lies on the print and is not printed; 0: none.", 0.0, 50.0
     )
-    width_mm: float = field(
-        default=60.0, metadata={"help": "Width of the sensing area, along the columns.", "range": (1.0, 1000.0)}
-    )
-    isolation_mm: float = field(
-        default=0.4, metadata={"help": "Cover over the columns; 0 leaves it out.", "range": (0.0, 10.0)}
-    )
-    pitch_x_mm: float = field(default=10.0, metadata={"help": "Distance from column to column.", "range": (0.5, 200.0)})
-    pitch_y_mm: float = field(default=10.0, metadata={"help": "Distance from row to row.", "range": (0.5, 200.0)})
-    columns: float = field(
-        default=0.0,
-        metadata={"help": "Number of columns, evenly spread; 0: by pitch_x.", "range": (0.0, 1000.0), "count": True},
-    )
-    rows: float = field(
-        default=0.0,
-        metadata={"help": "Number of rows, evenly spread; 0: by pitch_y.", "range": (0.0, 1000.0), "count": True},
-    )
-    column_mm: float = field(
-        default=0.0,
-        metadata={"help": "Width of a column; 0: four fifths of the pitch, in steps of 2 mm.", "range": (0.0, 200.0)},
-    )
-    row_mm: float = field(
-        default=0.0,
-        metadata={"help": "Width of a row; 0: four fifths of the pitch, in steps of 2 mm.", "range": (0.0, 200.0)},
-    )
-    base_mm: float = field(
-        default=0.4, metadata={"help": "Isolation under the rows; 0 leaves it out.", "range": (0.0, 10.0)}
-    )
-    connector_mm: float = field(
-        default=2.54, metadata={"help": "Distance of the pads, and of the leads.", "range": (0.5, 50.0)}
-    )
-    lead_mm: float = field(default=1.8, metadata={"help": "Width of leads and pads.", "range": (0.2, 50.0)})
-    pad_mm: float = field(default=6.0, metadata={"help": "Length of the pads.", "range": (1.0, 50.0)})
-    margin_mm: float = field(default=2.5, metadata={"help": "Edge around tracks and leads.", "range": (0.2, 50.0)})
-    cover_mm: float = field(
-        default=0.0,
-        metadata={"help": "Thickness of a sheet that lies on the print and is not printed; 0: none.",
-                  "range": (0.0, 50.0)},
+    cover_mpa: float = parameter(3.0, "Young's modulus of that sheet [MPa].", 0.001, 1e5)
+    between: str = choice(
+        "dielectric", "Between columns above the film: solid dielectric, or air that carries no load.",
+        "dielectric", "air",
     )  # fmt: skip
-    cover_mpa: float = field(
-        default=3.0, metadata={"help": "Young's modulus of that sheet [MPa].", "range": (0.001, 1e5)}
+    labels: str = choice(
+        "none", "Names of the tracks on their leads: raised, engraved into the cover, or none.",
+        "none", "raised", "engraved",
+    )  # fmt: skip
+    hole_mm: float = parameter(0.0, "Side of two square holes for pins beside the pads; 0 leaves them out.", 0.0, 20.0)
+    pads: str = choice(
+        "bottom", "Edge of the pads; at the left the print is exchanged in x and y, so that rows run along y.",
+        "bottom", "left",
+    )  # fmt: skip
+    seams: str = choice(
+        "none", "Ends without a margin, where the next tile follows: of the rows, of the columns, or both.",
+        "none", "rows", "columns", "both",
+    )  # fmt: skip
+    seam_mm: float = parameter(
+        0.0, "Width of the base that reaches under the next tile, at the end of the columns.", 0.0, 50.0
     )
-    between: str = field(
-        default="dielectric",
-        metadata={"help": "Between columns above the film: solid dielectric, or air that carries no load.",
-                  "choices": ("dielectric", "air")},
-    )  # fmt: skip
-    labels: str = field(
-        default="none",
-        metadata={"help": "Names of the tracks on their leads: raised, engraved into the cover, or none.",
-                  "choices": ("none", "raised", "engraved")},
-    )  # fmt: skip
-    hole_mm: float = field(
-        default=0.0,
-        metadata={
-            "help": "Side of two square holes for pins beside the pads; 0 leaves them out.",
-            "range": (0.0, 20.0),
-        },
-    )
-    pads: str = field(
-        default="bottom",
-        metadata={"help": "Edge of the pads; at the left the print is exchanged in x and y, so that rows run along y.",
-                  "choices": ("bottom", "left")},
-    )  # fmt: skip
-    seams: str = field(
-        default="none",
-        metadata={"help": "Ends without a margin, where the next tile follows: of the rows, of the columns, or both.",
-                  "choices": ("none", "rows", "columns", "both")},
-    )  # fmt: skip
-    seam_mm: float = field(
-        default=0.0,
-        metadata={"help": "Width of the base that reaches under the next tile, at the end of the columns.",
-                  "range": (0.0, 50.0)},
-    )  # fmt: skip
-    tile: float = field(
-        default=0.0,
-        metadata={"help": "Number of a tile, before the names on its leads.", "range": (0.0, 999.0), "count": True},
-    )
+    tile: float = parameter(0.0, "Number of a tile, before the names on its leads.", 0.0, 999.0, count=True)
 
     def __post_init__(self) -> None:
         """Fill in widths; refuse tracks that touch, too many crossings, and what the cover or the base lacks."""

@@ -41,7 +41,8 @@ def with_border(data: dict[str, Any], folder: Path) -> dict[str, Any]:
         import shapely
 
         text = str(shapely.Polygon(corners).wkt)
-        data = _with_regions(data, feet.regions(given))
+        if data.get("shape") == "array":
+            data = {"regions": feet.regions(given), **data}  # of its foot, where it has no others
     else:
         from sensorgen.scene.geometry import outline_files
 
@@ -55,11 +56,6 @@ def with_border(data: dict[str, Any], folder: Path) -> dict[str, Any]:
         if not isinstance(own, float | int) or abs(own - value) > _SAME_MM:
             raise BadInput(f"parameters.{key} is {own}, but the border is {value:g} mm; leave one of them out")
     return {**data, "border": text, "parameters": {**parameters, "length_mm": length, "width_mm": width}}
-
-
-def _with_regions(data: dict[str, Any], of_foot: Mapping[str, Any]) -> dict[str, Any]:
-    """An array's data with the regions of its foot, where it has no others."""
-    return {"regions": of_foot, **data} if data.get("shape") == "array" else data
 
 
 @lru_cache(maxsize=8)

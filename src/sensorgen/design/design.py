@@ -27,11 +27,10 @@ from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, problem, shown, stated
 from sensorgen.design import borders, imported, packs, shapes
 from sensorgen.design import materials as material_files
-from sensorgen.design.effects import Effects, TipData
 from sensorgen.design.packs import Kind
 from sensorgen.design.printer import Pattern, Printer, Quality, load_printer, load_quality
 from sensorgen.design.profile import Profile, with_own
-from sensorgen.design.tip import EVEN, STIFF
+from sensorgen.design.tip import EVEN, STIFF, Effects, TipData
 from sensorgen.scene.scene import Envelope, Fill, Scene
 
 if TYPE_CHECKING:
@@ -760,12 +759,8 @@ def _shape_in_name(design: Design) -> Iterator[str]:
     for field in dataclasses.fields(design.form.Params):
         value = getattr(params, field.name)
         if field.name not in named and value != field.default:
-            yield field.name.removesuffix("_mm").replace("_", "-") + _in_name(value)
-
-
-def _in_name(value: float | str) -> str:
-    """A parameter's value as a part of a name."""
-    return f"-{_plain(value)}" if isinstance(value, str) else f"{value:.10g}"
+            in_name = f"-{_plain(value)}" if isinstance(value, str) else f"{value:.10g}"
+            yield field.name.removesuffix("_mm").replace("_", "-") + in_name
 
 
 def _plain(word: str) -> str:

@@ -201,11 +201,6 @@ _LIMITS = (
 _Profile = TypeVar("_Profile", Printer, Quality)
 
 
-def folder() -> Path:
-    """Where printers, qualities and profile templates that ship are."""
-    return packs.profiles()
-
-
 def printer_names() -> list[str]:
     """Names of the printers that ship with sensorgen."""
     return sorted(packs.shipped_names("printers"))

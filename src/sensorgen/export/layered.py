@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from sensorgen.core.arrays import Real, Whole
+from sensorgen.core.arrays import Real, Whole, parts_of
 from sensorgen.core.errors import OutOfRange, library
 from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.layers import LayerRegions, inside, is_rectilinear
@@ -106,10 +106,8 @@ def _split(at_mm: Real, pitch_mm: float) -> Real:
     if not pitch_mm > 0:
         raise OutOfRange(f"voxels of {pitch_mm:g} mm: expected a length above 0")
     more = np.ceil(np.diff(at_mm) / pitch_mm - 1e-9).astype(int)
-    starts = np.repeat(at_mm[:-1], more)
-    step = np.repeat(np.diff(at_mm) / more, more)
-    within = np.arange(len(starts)) - np.repeat(np.cumsum(more) - more, more)
-    return np.append(starts + within * step, at_mm[-1])
+    which, within = parts_of(more)
+    return np.append(at_mm[which] + within * (np.diff(at_mm) / more)[which], at_mm[-1])
 
 
 TERMINALS = {"bottom": 1, "top": 2}

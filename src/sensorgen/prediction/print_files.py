@@ -18,7 +18,7 @@ from sensorgen.core import cache as stored
 from sensorgen.core.errors import SensorgenError, UnknownName
 from sensorgen.core.records import adapter
 from sensorgen.design.design import Design
-from sensorgen.design.printer import folder as profiles
+from sensorgen.design.packs import profiles
 from sensorgen.design.walls import PROGRAMS, SLICERS
 
 if TYPE_CHECKING:

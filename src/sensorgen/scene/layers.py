@@ -18,6 +18,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
+from sensorgen.core.arrays import parts_of
 from sensorgen.scene.scene import (
     SLIVER_MM,
     Body,
@@ -111,8 +112,8 @@ def inside(region: Region, x: NDArray[np.float64], y: NDArray[np.float64]) -> ND
     edges = np.stack([corners[:-1], corners[1:]], axis=1)[ring[1:] == ring[:-1]]
     low, high = np.take_along_axis(edges, edges[..., 1:].argsort(axis=1), axis=1).swapaxes(0, 1)
     first, last = np.searchsorted(y, low[:, 1]), np.searchsorted(y, high[:, 1])
-    edge = np.repeat(np.arange(len(edges)), last - first)
-    row = np.arange(len(edge)) - np.repeat(np.cumsum(last - first) - last, last - first)
+    edge, step = parts_of(last - first)
+    row = first[edge] + step
     (x0, y0), (x1, y1) = low[edge].T, high[edge].T
     met = np.zeros((len(x) + 1, len(y)), np.int64)
     np.add.at(met, (np.searchsorted(x, x0 + (y[row] - y0) / (y1 - y0) * (x1 - x0)), row), 1)

@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 import shapely
 
-from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.core.arrays import Columns, Mask, Real, Whole, parts_of
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode.motion import Numbering, follow, paths_of, tools_of
@@ -39,7 +39,7 @@ _Trees = Callable[["_Level"], shapely.STRtree]
 
 
 @dataclass(frozen=True, eq=False)
-class PrintedLines:
+class PrintedLines(Columns):
     """Printed lines of the bodies as rectangles in plan, half a width longer at both ends.
 
     Attributes
@@ -59,13 +59,9 @@ class PrintedLines:
     tool: Whole
     number: Whole
 
-    def of(self, rows: Mask | Whole) -> "PrintedLines":
-        """Some of the lines."""
-        return PrintedLines(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
-
 
 @dataclass(frozen=True, eq=False)
-class MovePieces:
+class MovePieces(Columns):
     """Straight pieces of moves.
 
     Attributes
@@ -83,10 +79,6 @@ class MovePieces:
     end_mm: Real
     tool: Whole
     number: Whole
-
-    def of(self, rows: slice) -> "MovePieces":
-        """Some of the pieces."""
-        return MovePieces(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,8 +227,7 @@ def _counts(way_mm: Real) -> Whole:
 
 def _shares(count: Whole) -> tuple[Whole, Real, Real]:
     """Of each piece, of some things cut to so many: the thing, and from which share of it to which."""
-    which = np.repeat(np.arange(len(count)), count)
-    step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+    which, step = parts_of(count)
     return which, step / count[which], (step + 1) / count[which]
 
 
@@ -272,8 +263,8 @@ def _points(
     point = np.repeat((first[place] + begin)[order] - (np.cumsum(span) - span), span) + np.arange(span.sum())
     top = np.full(count.sum(), -2, np.int64)
     top[point] = np.repeat(key[order], span)
-    which = np.repeat(np.arange(len(mine)), count)
-    share = (np.arange(len(which)) - first[which] + 0.5) / count[which]
+    which, step = parts_of(count)
+    share = (step + 0.5) / count[which]
     at = start[which] + share[:, None] * way[which]
     gap = at[:, 2] - (top // 2) * _LEVEL_MM
     here = (top % 2 == 1) & (gap <= within_mm + _ROUNDING_MM)

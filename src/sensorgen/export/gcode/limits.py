@@ -13,8 +13,9 @@ import numpy as np
 from sensorgen.core import yamlfile
 from sensorgen.core.arrays import Mask
 from sensorgen.core.errors import BadInput
+from sensorgen.design import packs
 from sensorgen.design.materials import Material
-from sensorgen.design.printer import Printer, folder
+from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import words
 from sensorgen.export.gcode.moves import NO_TOOL, Event, Motion
 from sensorgen.export.gcode.results import Findings, GcodeFinding
@@ -84,7 +85,7 @@ def commands(machine: Printer) -> Commands:
 
 @cache
 def _of_firmware(flavour: str) -> Commands:
-    data = yamlfile.read(folder() / "commands" / f"{flavour}.yaml")
+    data = yamlfile.read(packs.profiles() / "commands" / f"{flavour}.yaml")
     return Commands(
         {
             code: _allowed(code, text, outside=place == "outside")

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.core.arrays import Columns, Mask, Real, Whole
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import words
 from sensorgen.export.gcode.moves import (
@@ -151,7 +150,7 @@ class _Steps:
             FileFault(int(rows[k, 9]), f"G{int(code[k])} without a centre that fits; taken as a straight line")
             for k in row[~fits].tolist()
         ]
-        return Arcs.of(row[fits], start[fits], end[fits], centre[fits], clockwise[fits]), faults
+        return Arcs.between(row[fits], start[fits], end[fits], centre[fits], clockwise[fits]), faults
 
     def _rows(self, places: Sequence[int]) -> list[int]:
         """Number of moves before each of some places."""
@@ -217,7 +216,7 @@ NOT_MODEL = frozenset(
 
 
 @dataclass(frozen=True, eq=False)
-class Paths:
+class Paths(Columns):
     """One row per move that extrudes; arcs stand as chords, retractions and their return count for nothing.
 
     Attributes
@@ -269,15 +268,10 @@ class Paths:
         """
         return self.filament_mm * (math.pi / 4 * filament_diameter_mm**2)
 
-    def chosen(self, rows: NDArray[np.bool_]) -> "Paths":
-        """The rows of a mask, (n,)."""
-        columns = ("start_mm", "end_mm", "filament_mm", "tool", "kind", "height_mm", "width_mm", "layer", "number")
-        return replace(self, **{name: getattr(self, name)[rows] for name in columns})
-
     def model(self) -> "Paths":
         """The lines of the bodies: neither skirt, tower nor support, and nothing pushed on the spot."""
         bodies = np.array([name not in NOT_MODEL for name in self.kinds])
-        return self.chosen(bodies[self.kind] & (self.length_mm() > 0))
+        return self.of(bodies[self.kind] & (self.length_mm() > 0))
 
 
 def read(source: Source, machine: Printer, numbering: Numbering = "printer") -> Paths:
@@ -335,7 +329,7 @@ def tools_of(motion: Motion, machine: Printer, numbering: Numbering = "printer")
 def _straight(motion: Motion, rows: Whole) -> tuple[Whole, Real, Real, Real]:
     """Some moves as straight lines: the move of each, its start and end [mm], and its share of the move's filament."""
     bent = np.isin(motion.arcs.row, rows)
-    which, start, end = motion.arcs.chosen(bent).chords()
+    which, start, end = motion.arcs.of(bent).chords()
     row = motion.arcs.row[bent]
     straight = rows[~np.isin(rows, row)]
     every = np.concatenate([straight, row[which]])

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.core.arrays import Columns, Mask, Real, Whole, parts_of
 from sensorgen.design.printer import MaxSpeed
 from sensorgen.export.gcode.words import Command
 
@@ -20,7 +20,7 @@ _FULL = 1e-9  # a turn below this is a full circle [rad]
 
 
 @dataclass(frozen=True, eq=False)
-class Arcs:
+class Arcs(Columns):
     """Moves that are arcs.
 
     Attributes
@@ -37,7 +37,7 @@ class Arcs:
     Examples
     --------
     >>> start, end = np.array([[1.0, 0, 0]]), np.array([[-1.0, 0, 0]])
-    >>> half = Arcs.of(np.array([4]), start, end, np.zeros((1, 2)), np.array([False]))
+    >>> half = Arcs.between(np.array([4]), start, end, np.zeros((1, 2)), np.array([False]))
     >>> [m.round(3).tolist() for m in (half.across_mm(), *half.box_mm())]
     [[3.142], [[-1.0, 0.0, 0.0]], [[1.0, 1.0, 0.0]]]
     """
@@ -49,7 +49,7 @@ class Arcs:
     turn: Real
 
     @classmethod
-    def of(cls, row: Whole, start_mm: Real, end_mm: Real, centre_mm: Real, clockwise: Mask) -> "Arcs":
+    def between(cls, row: Whole, start_mm: Real, end_mm: Real, centre_mm: Real, clockwise: Mask) -> "Arcs":
         """Arcs between two places; the same place twice means a full circle. Clockwise is as seen from above: G2."""
         first, last = (_angle(place[:, :2] - centre_mm) for place in (start_mm, end_mm))
         left = (last - first) % math.tau
@@ -61,10 +61,6 @@ class Arcs:
     def __len__(self) -> int:
         """Number of arcs [-]."""
         return len(self.row)
-
-    def chosen(self, rows: Mask) -> "Arcs":
-        """The arcs of a mask."""
-        return Arcs(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
     def radius_mm(self) -> Real:
         """Radius at the start of each [mm]."""
@@ -92,8 +88,7 @@ class Arcs:
         sag = np.minimum(SAG_MM / (2 * np.maximum(self.radius_mm(), SAG_MM)), 0.5)
         angle = 4 * np.arcsin(np.sqrt(sag))  # acos(1 - sag / radius) would be 0 for a large one
         count = np.asarray(np.clip(np.ceil(np.abs(self.turn) / angle), 1, MOST_CHORDS), np.int64)
-        which = np.repeat(np.arange(len(self)), count)
-        step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+        which, step = parts_of(count)
         ends = []
         for share in (step / count[which], (step + 1) / count[which]):
             at = _angle(self.start_mm[:, :2] - self.centre_mm)[which] + self.turn[which] * share

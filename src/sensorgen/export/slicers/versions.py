@@ -17,7 +17,7 @@ from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked
-from sensorgen.design.printer import folder
+from sensorgen.design import packs
 
 Version = tuple[int, ...]  # (2, 9, 2); () is the oldest that the templates are written for
 
@@ -73,7 +73,7 @@ def changes(slicer: str) -> dict[Version, VersionChange]:
         A file is not as :class:`VersionChange` has it.
     """
     by_version = {}
-    for path in (folder() / "versions").glob(f"{slicer}-*.yaml"):
+    for path in (packs.profiles() / "versions").glob(f"{slicer}-*.yaml"):
         try:
             by_version[parse(path.stem.partition("-")[2])] = checked(VersionChange, yamlfile.read(path))
         except BadInput as error:
@@ -89,7 +89,7 @@ def folders(slicer: str) -> dict[str, Version]:
 
 def template(slicer: str, version: Version, name: str) -> str:
     """Text of a template of a slicer, adapted to its version."""
-    text = (folder() / slicer / name).read_text("utf-8")
+    text = (packs.profiles() / slicer / name).read_text("utf-8")
     for since, change in changes(slicer).items():
         if since <= version:
             text = change.adapted(name, text)

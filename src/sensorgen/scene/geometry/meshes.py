@@ -57,15 +57,11 @@ class Mesh:
         """Triangles, so many at once that a sum over them takes little memory."""
         return (self.triangles[k : k + _AT_ONCE] for k in range(0, len(self.triangles), _AT_ONCE))
 
-    def edges(self) -> Whole:
-        """Directed edges of the triangles (3 m, 2), those of the first triangle first."""
-        return self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
-
     def sharp_edges(self, cosine: float = 0.999) -> Whole:
         """Edges (n, 2), sorted: of one face alone, or between faces whose normals have at most this cosine."""
         normal = self.normals_mm2()
         normal /= np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-300)
-        sides = np.sort(self.edges(), axis=1)
+        sides = np.sort(edges(self.triangles), axis=1)
         order = np.lexsort((sides[:, 1], sides[:, 0]))
         first = np.flatnonzero(np.append(True, (sides[order][1:] != sides[order][:-1]).any(1)))
         count = np.diff(np.append(first, len(order)))
@@ -98,6 +94,11 @@ class Mesh:
         places = self.vertices_mm - self.vertices_mm[0]  # near the body, so that little cancels
         some = (places[part] for part in self._parts())
         return sum(float(np.einsum("ij,ij->", of[:, 0], np.cross(of[:, 1], of[:, 2]))) for of in some) / 6.0
+
+
+def edges(triangles: NDArray[np.integer[Any]]) -> Whole:
+    """Directed edges of triangles (3 m, 2), those of the first triangle first."""
+    return triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
 
 
 def joined(parts: Sequence[Mesh]) -> Mesh:

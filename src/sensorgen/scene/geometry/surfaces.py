@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.connections import groups
-from sensorgen.scene.geometry.meshes import Mesh, joined
+from sensorgen.scene.geometry.meshes import Mesh, edges, joined
 from sensorgen.scene.layers import outlines
 from sensorgen.scene.polyhedra import Polyhedron
 from sensorgen.scene.scene import AXES, PLANE, Outline, Piece, Place, Prism, box
@@ -127,16 +127,11 @@ def _welded(points: Real, faces: Whole, near_mm: float) -> tuple[Real, Whole]:
     return exact[first], faces[distinct]
 
 
-def _edges(faces: Whole) -> Whole:
-    """Directed edges of triangles (3 m, 2), those of the first triangle first."""
-    return faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-
-
 def _open(faces: Whole) -> Whole:
     """Numbers of directed edges that have no opposite one."""
-    edges = _edges(faces)
-    n = int(edges.max(initial=0)) + 1
-    there, back = edges @ [n, 1], edges @ [1, n]
+    ways = edges(faces)
+    n = int(ways.max(initial=0)) + 1
+    there, back = ways @ [n, 1], ways @ [1, n]
     keys = np.unique(there)
     place = np.searchsorted(keys, back).clip(max=max(len(keys) - 1, 0))
     has = keys[place] == back if len(keys) else np.zeros(0, bool)
@@ -153,12 +148,12 @@ def _once(faces: Whole) -> tuple[Whole, int]:
 
 def _oriented(faces: Whole) -> tuple[Whole, int]:
     """Triangles turned so that neighbours over an edge of two look to the same side, and how many were turned."""
-    edges = np.sort(_edges(faces), axis=1)
-    order = np.lexsort(edges.T)
-    same = (edges[order][1:] == edges[order][:-1]).all(1)
+    directed = edges(faces)
+    sides = np.sort(directed, axis=1)
+    order = np.lexsort(sides.T)
+    same = (sides[order][1:] == sides[order][:-1]).all(1)
     pair = same & ~np.append(False, same[:-1]) & ~np.append(same[1:], False)
     one, other = order[:-1][pair], order[1:][pair]
-    directed = _edges(faces)
     against = (directed[one] == directed[other]).all(1)
     if not against.any():
         return faces, 0
@@ -174,7 +169,7 @@ def _oriented(faces: Whole) -> tuple[Whole, int]:
 def _filled(points: Real, faces: Whole) -> tuple[Whole, list[str], list[SurfaceFault]]:
     """Triangles with flat openings closed, how, and the openings that are not flat."""
     after = defaultdict(list)
-    for a, b in _edges(faces)[_open(faces)].tolist():
+    for a, b in edges(faces)[_open(faces)].tolist():
         after[b].append(a)  # the other way round: as the face that is missing has them
     added, repairs, faults = [faces], [], []
     while after:
@@ -226,14 +221,14 @@ def _cap(ring: Real) -> Whole | None:
 
 def _mates(points: Real, faces: Whole) -> tuple[Whole, list[SurfaceFault]]:
     """For each directed edge the one of the neighbouring face; faults where there is none."""
-    edges = _edges(faces)
-    sides = np.sort(edges, axis=1)
+    ways = edges(faces)
+    sides = np.sort(ways, axis=1)
     _, label = np.unique(sides, axis=0, return_inverse=True)
     order = np.argsort(label.reshape(-1), kind="stable")
     starts = np.flatnonzero(np.append(True, np.diff(label.reshape(-1)[order]) > 0))
     counts = np.diff(np.append(starts, len(order)))
-    forward = edges[:, 0] < edges[:, 1]
-    mates = np.full(len(edges), -1)
+    forward = ways[:, 0] < ways[:, 1]
+    mates = np.full(len(ways), -1)
     two = starts[counts == 2]
     one, other = order[two], order[two + 1]
     good = forward[one] != forward[other]
@@ -244,11 +239,11 @@ def _mates(points: Real, faces: Whole) -> tuple[Whole, list[SurfaceFault]]:
         if 2 * int(forward[here].sum()) != count:
             bad.append(int(here[0]))
             continue
-        for a, b in _through_material(points, faces, edges, here, forward):
+        for a, b in _through_material(points, faces, ways, here, forward):
             mates[a], mates[b] = b, a
     faults = []
     if bad:
-        place = _place(points[edges[bad[0]]].mean(0))
+        place = _place(points[ways[bad[0]]].mean(0))
         many = f" and {len(bad) - 1} others" if len(bad) > 1 else ""
         message = f"no outside can be given to its faces: one edge{many} has faces that look to different sides"
         faults.append(SurfaceFault(message, "remove faces inside the body, and export a solid", place))
@@ -256,12 +251,12 @@ def _mates(points: Real, faces: Whole) -> tuple[Whole, list[SurfaceFault]]:
 
 
 def _through_material(
-    points: Real, faces: Whole, edges: Whole, here: Whole, forward: NDArray[np.bool_]
+    points: Real, faces: Whole, ways: Whole, here: Whole, forward: NDArray[np.bool_]
 ) -> list[tuple[int, int]]:
     """Pairs of the faces around one edge between which there is material."""
-    a, b = points[np.sort(edges[here[0]])]
+    a, b = points[np.sort(ways[here[0]])]
     axis = (b - a) / np.linalg.norm(b - a)
-    tips = points[[next(c for c in faces[k // 3] if c not in edges[k]) for k in here]] - a
+    tips = points[[next(c for c in faces[k // 3] if c not in ways[k]) for k in here]] - a
     tips -= (tips @ axis)[:, None] * axis
     u = tips[0] / max(np.linalg.norm(tips[0]), 1e-300)
     angle = np.arctan2(tips @ np.cross(axis, u), tips @ u)
@@ -452,9 +447,9 @@ def _prisms(mesh: Mesh, axis: str, near_mm: float) -> tuple[Prism, ...]:
 
 def _region(mesh: Mesh, faces: Whole, plane: Sequence[int], near_mm: float) -> shapely.Geometry:
     """Region that level faces cover, by the edges that only one of them has."""
-    edges = mesh.edges().reshape(-1, 3, 2)[faces].reshape(-1, 2)
-    _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
-    border = edges[first[count == 1]]
+    ways = edges(mesh.triangles[faces])
+    _, first, count = np.unique(np.sort(ways, axis=1), axis=0, return_index=True, return_counts=True)
+    border = ways[first[count == 1]]
     lines = shapely.linestrings(mesh.vertices_mm[border][:, :, plane])
     rings = shapely.get_parts(shapely.polygonize([shapely.union_all(lines, grid_size=_GRID_MM)]))
     middles = shapely.point_on_surface(rings)
