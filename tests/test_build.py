@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from no_numbers import unpredicted
 from sensorgen.core import lazy as registry
 from sensorgen.core import parallel
 from sensorgen.core.cache import only_known
@@ -26,15 +25,8 @@ from sensorgen.workflows import build as workflow
 from sensorgen.workflows.build import build
 
 DESIGNS = Path(__file__).parents[1] / "designs"
-PRINTABLE = sorted(p.relative_to(DESIGNS).as_posix() for p in DESIGNS.rglob("*.yaml") if not p.stem.endswith("-d0"))
-SHORTED = sorted(p.relative_to(DESIGNS).as_posix() for p in DESIGNS.rglob("*-d0.yaml"))
-FAST = {"reference.yaml", "23/trix-d0.2.yaml", "23/sqyx-d0.1.yaml", "23/trix-d0.yaml", "23/sqyx-d0.yaml"}
+
 TRI = {"shape": "tri", "name": "trix-d0.2", "parameters": {"length_mm": 20.0}}
-
-
-def tiers(names, nightly):
-    """The names as parameters, some of which only the nightly run has."""
-    return [pytest.param(name, marks=[pytest.mark.nightly] if name in nightly else []) for name in names]
 
 
 def contents(folder):
@@ -85,19 +77,11 @@ def test_the_design_file_beside_the_results_builds_the_same_design(whole):
     assert design.make(data).id() == design.make(TRI).id()
 
 
-@pytest.fixture(scope="module", params=tiers(PRINTABLE, {*PRINTABLE} - FAST))
-def of_the_thesis(request, tmp_path_factory):
-    """A design of the thesis, and the folder of its build."""
-    variant = design.load(DESIGNS / request.param)
-    with unpredicted():
-        return variant, build(variant, tmp_path_factory.mktemp("thesis"), cad=False).folder
-
-
 @pytest.mark.parametrize("family", FAMILIES)
-def test_lib3mf_reads_every_3mf_of_the_thesis_back(of_the_thesis, family):
+def test_lib3mf_reads_every_3mf_back(whole, family):
     import lib3mf
 
-    variant, folder = of_the_thesis
+    variant, folder = design.make(TRI), whole.folder
     model = lib3mf.Wrapper().CreateModel()
     reader = model.QueryReader("3mf")
     reader.SetStrictModeActive(True)
@@ -125,7 +109,7 @@ def volume_mm3(vertices, triangles):
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
-@pytest.mark.parametrize("name", tiers(SHORTED, {*SHORTED} - FAST))
+@pytest.mark.parametrize("name", ["23/trix-d0.yaml", "23/sqyx-d0.yaml"])
 @pytest.mark.usefixtures("roughly")
 def test_a_film_of_nothing_is_refused_unless_forced(name, tmp_path):
     variant = design.load(DESIGNS / name)

@@ -39,7 +39,6 @@ def test_ids_and_names_of_all_changes_differ():
         {"name": "other"},
         {"waivers": [{"rule": "5", "reason": "seen on the bench"}]},
         {"parameters": {"period_mm": 2, "along": "x"}},
-        {"quality": "fine", "orientation": "as-drawn"},
         {"materials": {"film": "x60", "support": None}},
     ],
     ids=str,
@@ -109,9 +108,7 @@ BAD = [
     *(({"shape": array, "parameters": {"period_mm": 30}}, OutOfRange, "is more than the sensor's shorter side, 10 mm")
       for array in ("bump", "cone", "pillar", "pyramid")),
     ({"shape": "tri", "tools": {"x60": True}}, BadInput, "tools.x60 is True; expected a whole number"),
-    ({"shape": "tri", "tools": {"x60": 10**5000}}, BadInput, "tools.x60 is a huge number; expected 99 or less"),
     ({"shape": "tri", "tools": {"bvoh": 7}}, BadInput, "diabase-h5 has no tool 7"),
-    ({"shape": "tri", "shrinkage": True}, BadInput, "shrinkage is True; expected a number"),
     ({"shape": "tri", "shrinkage": 0.9}, BadInput, "shrinkage is 0.9; expected a number below 0.9"),
     ({"shape": "tri", "nozzle_mm": "0.4"}, BadInput, "nozzle_mm is '0.4'; expected a number"),
     ({"shape": "tri", "waivers": {"rule": "5"}}, BadInput, "expected a list"),
@@ -171,12 +168,9 @@ def cogs(monkeypatch):
 @pytest.mark.parametrize(
     ("parameters", "name"),
     [
-        ({}, "cogs"),
         ({"form": "dome"}, "cogs"),
         ({"form": "hook"}, "cogs-form-hook"),
-        ({"foot": "hook"}, "cogs-foot-hook"),
         ({"form": "half round", "length_mm": 50}, "cogs-length50-form-half-round"),
-        ({"corners": 8}, "cogs-corners8"),
     ],
 )
 def test_a_parameter_that_is_a_word_stands_in_the_name(cogs, parameters, name):
@@ -187,13 +181,9 @@ def test_a_parameter_that_is_a_word_stands_in_the_name(cogs, parameters, name):
     ("corners", "said"),
     [
         ((), "of 0 corners is open: none;"),
-        (((0, 0), (1, 0)), "of 2 corners is open: \\(0, 0\\), \\(1, 0\\);"),
-        (((0, 0), (1, 0), (2, 0)), "encloses nothing"),
         (((0, 0), (1, 1), (1, 0), (0, 1)), "encloses nothing"),  # two triangles, one the other way round
         (((0, 0), (1, 0), (1, 1), (0, 1), (0, 0)), "has the same corner twice in a row"),
-        (((0, 0), (1, 0), (1, 0), (1, 1)), "has the same corner twice in a row"),
         (((0, 0), (float("nan"), 0), (1, 1)), "has a corner that is nowhere"),
-        (((0, 0), (1, 0), (1, float("inf"))), "has a corner that is nowhere"),
     ],
 )
 def test_an_outline_that_encloses_nothing_is_refused_wherever_a_scene_is_made(cogs, monkeypatch, corners, said):

@@ -21,7 +21,7 @@ from sensorgen.scene.drawing.paper import ViewFrame, width
 from sensorgen.scene.drawing.view import Measure, nearest, period, views
 from sensorgen.scene.layers import faces_mm
 from sensorgen.scene.polyhedra import Polyhedron
-from sensorgen.scene.scene import Body, Fill, Point, Prism, Scene, area_mm2, box
+from sensorgen.scene.scene import Body, Fill, Point, Scene, area_mm2, box
 from sensorgen.scene.sections import Section, SectionColumn, columns
 
 SHAPES = registry.names(shapes)
@@ -143,8 +143,7 @@ def test_both_directions_of_crossed_strips_are_drawn_through_the_conductor() -> 
     assert [view.section.across for view in views(scene_of("reference"))] == ["x"]
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize(("layer_mm", "first_mm"), [(0.1, None), (0.06, None), (0.1, 0.2)])
+@pytest.mark.parametrize(("shape", "layer_mm", "first_mm"), [("tri", 0.06, None), ("rect", 0.1, 0.2)])
 def test_layer_lines_respect_the_first_layer(shape: str, layer_mm: float, first_mm: float | None) -> None:
     scene = scene_of(shape)
     grid = layers_of(scene, layer_mm, first_mm)
@@ -167,7 +166,7 @@ def test_many_layers_get_every_tenth_number_and_few_lines() -> None:
     assert all(int(number or "") % 10 == 0 for number in bold)
 
 
-@pytest.mark.parametrize("layer", [1, 6, 13])
+@pytest.mark.parametrize("layer", [1, 13])
 def test_a_finding_without_a_place_stands_at_the_middle_of_its_layer(layer: int) -> None:
     page = drawn(scene_of("tri"), finding(layer=layer))
     mids = heights(page, "mid")
@@ -229,10 +228,6 @@ def test_the_text_of_a_finding_is_whole() -> None:
     assert message[::-1] in said
 
 
-def test_no_findings_are_said_to_be_none() -> None:
-    assert any("no findings" in line for line in words(drawn(scene_of("reference"))))
-
-
 def test_hostile_words_stay_words() -> None:
     hostile = "Größe \"<script>alert(1)</script>\" & 'x' ]]> \x00\x08\ud800\u202e " + "W" * 400
     scene = scene_of("tri")
@@ -251,7 +246,6 @@ def test_hostile_words_stay_words() -> None:
     ("shape", "parameters"),
     [
         ("rect", {"length_mm": 330.0, "width_mm": 330.0}),
-        ("tri", {"length_mm": 330.0, "period_mm": 0.2, "dielectric_mm": 0.0}),
         ("tri", {"electrode_mm": 10.0, "hang_height_mm": 10.0, "period_mm": 0.5}),
     ],
 )
@@ -289,9 +283,7 @@ def stays_on_page(page: ET.Element) -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize(("layer_mm", "count"), [
-    (0.06, 12), *(pytest.param(*each, marks=NIGHTLY) for each in ((0.1, 0), (0.06, 0), (0.06, 3), (0.1, 3), (0.1, 12)))
-])  # fmt: skip
+@pytest.mark.parametrize(("layer_mm", "count"), [(0.06, 12), pytest.param(0.1, 3, marks=NIGHTLY)])
 def test_no_text_runs_into_another(shape: str, layer_mm: float, count: int) -> None:
     scene = scene_of(shape, Fill(support="bvoh"), isolation_mm=0.1)
     long = "The interface at 0.74 mm is off the layer grid and prints as 0.7 mm; " * 4
@@ -377,11 +369,6 @@ def test_bands_of_a_curved_face_are_no_faces_and_have_no_dimensions() -> None:
     assert (step.faces_mm(), tip.faces_mm()) == ({0.0, 0.35, 0.6}, {0.0, 1.05})
 
 
-def test_a_period_longer_than_the_view_is_drawn() -> None:
-    scene = scene_of("pillar", length_mm=73.0, width_mm=71.0, period_mm=20.0, side_mm=12.8)
-    assert "z [mm]" in words(drawn(scene))
-
-
 def test_the_period_survives_a_pattern_that_begins_within_one() -> None:
     strips = {view.section.across: view for view in views(scene_of("rect", width_mm=9.5).turned_over())}
     assert strips["y"].repeat_mm() == pytest.approx(2.0)
@@ -419,13 +406,6 @@ def test_the_gap_is_the_smallest_distance_even_aslant() -> None:
     assert short is not None
     assert short.value_mm == 0.0
     assert "gap 0: short" in words(drawn(scene_of("tri", dielectric_mm=0.0)))
-
-
-def test_a_scene_slanted_in_plan_is_drawn_too() -> None:
-    bump = Prism("z", ((2.0, 1.0), (3.0, 2.0), (2.0, 3.0), (1.0, 2.0)), 0.3, 0.6)
-    plate = box(0, 4, 0, 4, 0, 0.3)
-    scene = Scene((Body("plate", "etpu", (plate,), "bottom"), Body("bump", "x60", (bump,))), (4.0, 4.0, 0.6))
-    assert len(drawn(scene).findall(".//s:g[@class='view']", NS)) == 2
 
 
 def test_one_layer_no_layers_and_unknown_materials_are_drawn() -> None:

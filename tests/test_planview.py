@@ -55,7 +55,7 @@ def library(outline: Outline) -> CrossSection:
     return CrossSection([outline], FillRule.Positive)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(12))
 def test_three_outlines_over_each_other_are_cut_as_another_library_cuts_them(seed):
     """Seven pieces and the rest; the library rounds coordinates to 1e-8 mm."""
     a, b, c = (random_outline(3 * seed + k) for k in range(3))
@@ -70,8 +70,7 @@ def test_three_outlines_over_each_other_are_cut_as_another_library_cuts_them(see
     assert found[("floor",)] == pytest.approx(SIZE[0] * SIZE[1] - (ra + rb + rc).area(), abs=2e-7)
 
 
-@pytest.mark.parametrize("corners", [3, 5, 8, 100])
-@pytest.mark.parametrize("turn", [0.0, 0.1, pi / 8])
+@pytest.mark.parametrize(("corners", "turn"), [(3, 0.0), (5, 0.1), (100, pi / 8)])
 def test_a_regular_polygon_has_its_area_whichever_way_it_is_turned(corners, turn):
     found = areas(scene(upright("pillar", regular(corners, 1.0, turn=turn), 0.3, 1.0)))
     exact = corners / 2 * sin(tau / corners)
@@ -101,13 +100,6 @@ def test_outlines_that_share_edges_leave_nothing_between_them():
     found = areas(scene(upright("left", left, 0.3, 1.0), upright("right", right, 0.3, 1.0)))
     assert set(found) == {("floor", "left"), ("floor", "right")}
     assert sum(found.values()) == pytest.approx(12.0, rel=1e-12)
-
-
-def test_boxes_whose_sides_are_told_otherwise_are_the_same_boxes():
-    """Prisms along x or y that are boxes may stand beside pillars."""
-    beam = Body("beam", "x60", (Prism("x", rectangle(1.0, 2.0, 0.3, 0.6), 0.0, 4.0),))
-    found = areas(scene(beam, upright("pillar", regular(8, 0.4), 0.6, 1.0)))
-    assert found["floor", "beam"] + found["floor", "beam", "pillar"] == pytest.approx(4.0, rel=1e-12)
 
 
 def test_what_lies_beyond_the_sensor_or_under_nothing_is_told():

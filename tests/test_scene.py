@@ -63,7 +63,6 @@ def test_plate_is_three_plates():
         (1.0, 0.25, 0.0, 0.12),
         (0.25 + 1.0, 0.25, 0.03125, 0.12 + (0.24 + 0.12) / 2 * 0.25),
         (0.5 + 1.0, 0.25, 0.125, 0.12 + 0.06),
-        (0.75 + 1.0, 0.25, 0.125 + 0.09375, 0.12 + 0.06 + 0.015),
         (2.0 + 0.25, 0.25 + 0.03125, 0.25, 0.24 + 0.045),
     ],
 )
@@ -83,7 +82,6 @@ def test_a_partial_period_is_clipped_exactly(end, cog, hanging, lower):
         (tri, {"length_mm": 7.13, "width_mm": 3.3, "along": "y", "isolation_mm": 0.1}),
         (tri, {"length_mm": 1.01, "dielectric_mm": 0.0}),
         (rect, {"length_mm": 7.13, "width_mm": 3.3, "isolation_mm": 0.1}),
-        (rect, {"length_mm": 1.0, "width_mm": 1.01, "along": "yx", "dielectric_mm": 0.0}),
         (reference, {"length_mm": 7.13}),
     ],
 )
@@ -156,16 +154,11 @@ TRIANGLE = ((0.0, 0.0), (2.0, 0.0), (1.0, 1.0))
     ("prism", "axis", "at", "expected"),
     [
         (Prism("y", TRIANGLE, 3, 5), "z", 0.25, [rectangle(0.25, 1.75, 3, 5)]),
-        (Prism("y", TRIANGLE, 3, 5), "x", 0.5, [rectangle(3, 5, 0, 0.5)]),
         (Prism("y", TRIANGLE, 3, 5), "y", 4, [TRIANGLE]),
         (Prism("x", TRIANGLE, 3, 5), "z", 0.25, [rectangle(3, 5, 0.25, 1.75)]),
-        (Prism("x", TRIANGLE, 3, 5), "y", 0.5, [rectangle(3, 5, 0, 0.5)]),
-        (Prism("z", TRIANGLE, 3, 5), "x", 0.5, [rectangle(0, 0.5, 3, 5)]),
         (Prism("z", TRIANGLE, 3, 5), "y", 0.25, [rectangle(0.25, 1.75, 3, 5)]),
         (Prism("y", TRIANGLE, 3, 5), "z", 1.5, []),
         (Prism("y", TRIANGLE, 3, 5), "y", 2.9, []),
-        (box(0, 1, 0, 2, 0, 3), "x", 0.5, [rectangle(0, 2, 0, 3)]),
-        (box(0, 1, 0, 2, 0, 3), "y", 0.5, [rectangle(0, 1, 0, 3)]),
         (box(0, 1, 0, 2, 0, 3), "z", 0.5, [rectangle(0, 1, 0, 2)]),
     ],
 )
@@ -204,13 +197,13 @@ def test_a_plane_through_a_shared_face_cuts_one_of_the_two(axis):
     assert [below.cut(axis, 1.0), above.cut(axis, 1.0)] == [[], [rectangle(0, 1, 0, 1)]]
 
 
-@pytest.mark.parametrize(("end", "area"), [(3.0, 1.0), (2.0, 1.0), (1.5, 0.875), (1.0, 0.5), (0.5, 0.125)])
+@pytest.mark.parametrize(("end", "area"), [(3.0, 1.0), (1.5, 0.875), (0.5, 0.125)])
 def test_clipping_a_triangle_leaves_its_left_part(end, area):
     left = clipped(((0.0, 0.0), (2.0, 0.0), (1.0, 1.0)), end)
     assert area_mm2(left) == pytest.approx(area, rel=1e-12)
 
 
-@pytest.mark.parametrize(("end", "left"), [(0.0, False), (1e-10, False), (0.9e-6, False), (1.1e-6, True)])
+@pytest.mark.parametrize(("end", "left"), [(0.9e-6, False), (1.1e-6, True)])
 def test_less_than_a_nanometre_is_no_geometry(end, left):
     assert bool(clipped(((0.0, 0.0), (2.0, 0.0), (1.0, 1.0)), end)) is left
 
@@ -220,10 +213,6 @@ def test_what_is_shorter_than_its_pattern_has_no_empty_bodies(along):
     """Half a period holds one cog, and no hanging dielectric."""
     scene = tri.scene(tri.Params(length_mm=1.0, width_mm=1.0, along=along), Fill())
     assert [b.name for b in scene.bodies] == ["bottom_electrode", "film_and_lower", "top_electrode_with_cogs"]
-
-
-def test_a_scene_leaves_out_empty_bodies():
-    assert Scene((Body("film", "x60", ()),), (1, 1, 1)).bodies == ()
 
 
 @pytest.mark.parametrize("axis", "xyz")

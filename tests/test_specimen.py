@@ -58,10 +58,8 @@ def test_no_two_prints_of_the_thesis_share_a_name():
         ("  23   TRIX  .1mm   2 ", "23 triX .1mm 2"),
         ("23 triX 2 .1mm", "23 triX .1mm 2"),
         ("23 triX\u00a0.1 mm 2", "23 triX .1mm 2"),
-        ("23 triX ,1mm", "23 triX .1mm"),
         ("23 tri￥.2mm", "23 triY .2mm"),
         ("23 triX 1mm", "23 triX .1mm"),
-        ("23 triX .1mmfine", "23 triX .1mm fine"),
         ("23 triX xtra fine", "23 triX xtrafine"),
         ("23 triX 2 extrafine r", "23 triX 2 xtrafine r"),
         ("23-trix-d0.2-xtrafine-4", "23 triX .2mm 4 xtrafine"),
@@ -69,10 +67,7 @@ def test_no_two_prints_of_the_thesis_share_a_name():
         ("triX .2mm 3", "triX .2mm 3"),
         ("26 rectXY .15mm", "26 sqXY .15mm"),
         ("26 triX 2.0mm", "26 triX 2.0mm"),
-        ("26 triX 1.25mm 2", "26 triX 1.25mm 2"),
-        ("26 sx60 3", "26 SX60 3"),
         ("26 reference .6mm", "26 SX60 .6mm"),
-        ("26 double 1", "26 double 1"),
     ],
 )
 def test_other_slips(found, name):
@@ -84,15 +79,12 @@ def test_other_slips(found, name):
     [
         ("", "no shape"),
         ("23", "no shape"),
-        ("12345 triX", "no shape"),
         ("23 trjX", "no shape"),
         ("23 triXY", "X or Y"),
         ("23 sqXX", "XY or YX"),
         ("23 SX60 X", "cannot read 'x'"),
         ("23 triX .1mm .2mm", "two words for its film"),
-        ("23 triX 2 3", "two words for its replicate"),
         ("23 triX fine x fine", "two words for its slicing"),
-        ("23 triX r l", "two words for its place"),
         ("23 triX 0", "cannot read '0'"),
         ("23 triX finest", "cannot read 'finest'"),
         ("23 triX 10.5mm", "at most 10 mm"),
@@ -158,26 +150,18 @@ def test_names_that_do_not_tell_their_design(name):
     assert design_of(parse(name)) is None
 
 
-def test_the_plain_plate_and_the_double_one():
-    assert design_of(parse("26 SX60")).params.dielectric_mm == 0.6
-    assert design_of(parse("26 SX60 .4mm")).params.dielectric_mm == 0.4
-    assert design_of(parse("26 double 2")).shape == "double"
-
-
-@pytest.mark.parametrize("quality", ["fine", "extrafine"])
 @pytest.mark.parametrize(
     "data",
     [
-        {"shape": "tri", "parameters": {"dielectric_mm": 0.125, "along": "y"}},
+        {"shape": "tri", "parameters": {"dielectric_mm": 0.125, "along": "y"}, "quality": "extrafine"},
         {"shape": "tri", "parameters": {"dielectric_mm": 0.0}},
         {"shape": "rect", "parameters": {"dielectric_mm": 2.0, "along": "yx"}},
         {"shape": "reference"},
-        {"shape": "reference", "parameters": {"dielectric_mm": 1.25}},
         {"shape": "double"},
     ],
 )
-def test_the_name_of_a_design_leads_back_to_it(data, quality):
-    made = design.make(data | {"quality": quality})
+def test_the_name_of_a_design_leads_back_to_it(data):
+    made = design.make(data)
     specimen = parse(named(made, 26, 7).name)
     assert (specimen.iteration, specimen.replicate) == (26, 7)
     assert design_of(specimen).id() == made.id()

@@ -8,6 +8,7 @@ import sys
 import xml.etree.ElementTree as ET
 import zipfile
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import lib3mf
@@ -16,7 +17,9 @@ import pytest
 
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
 from sensorgen.export.threemf import FAMILIES, Part, content
-from sensorgen.scene.geometry.meshes import Mesh
+from sensorgen.scene import scene
+from sensorgen.scene.geometry.meshes import Mesh, mesh
+from sensorgen.scene.scene import Body
 
 CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 HOSTILE = "top \"of\" 'it' <film> & Größe µ € 😀 %s %d {x}"
@@ -25,11 +28,7 @@ TITLE = 'tri <d = 0.2> & "more"'
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Mesh:
     """A closed box between two corners [mm]."""
-    x, y, z = zip(low, high, strict=True)
-    corners = np.array([[a, b, c] for a in x for b in y for c in z], dtype=float)
-    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    triangles = [t for a, b, c, d in sides for t in ([a, b, c], [a, c, d])]
-    return Mesh(corners, np.array(triangles, dtype=np.int32))
+    return mesh(Body("", "", (scene.box(*map(float, chain.from_iterable(zip(low, high, strict=True)))),)))
 
 
 def parts() -> list[Part]:
@@ -84,14 +83,10 @@ def from_another_process():
 
 @pytest.mark.parametrize("family", FAMILIES)
 class TestEveryFamily:
-    def test_same_bytes_again_and_in_any_order(self, family):
-        once = content(family, TITLE, parts(), (1.5, -2.0))
-        assert content(family, TITLE, parts(), (1.5, -2.0)) == once
-        assert content(family, TITLE, parts()[::-1], (1.5, -2.0)) == once
-
-    def test_same_bytes_in_another_process(self, family, from_another_process):
+    def test_same_bytes_in_any_order_and_in_another_process(self, family, from_another_process):
         """Another hash seed, clock and process: nothing of these may be in the file."""
-        assert from_another_process[family] == content(family, TITLE, parts(), (1.5, -2.0))
+        once = content(family, TITLE, parts(), (1.5, -2.0))
+        assert content(family, TITLE, parts()[::-1], (1.5, -2.0)) == once == from_another_process[family]
 
     def test_no_clock_and_no_system_in_the_zip(self, family):
         with zipfile.ZipFile(io.BytesIO(content(family, TITLE, parts(), (0, 0)))) as archive:
@@ -100,15 +95,11 @@ class TestEveryFamily:
             assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
             assert {entry.create_system for entry in archive.infolist()} == {3}
 
-    def test_lib3mf_is_strict_and_has_nothing_to_say(self, family):
+    def test_lib3mf_reads_names_materials_and_volume(self, family):
         read, warnings = read_back(content(family, TITLE, parts(), (0, 0)))
         assert warnings == []
         meshes = list(every(read.GetMeshObjects(), "GetCurrentMeshObject"))
         assert all(m.IsValid() and m.IsManifoldAndOriented() for m in meshes)
-
-    def test_lib3mf_reads_names_materials_and_volume(self, family):
-        read, _ = read_back(content(family, TITLE, parts(), (0, 0)))
-        meshes = list(every(read.GetMeshObjects(), "GetCurrentMeshObject"))
         expected = [TITLE] if family == "prusa" else [p.name for p in sorted(parts(), key=lambda p: p.name)]
         assert [m.GetName() for m in meshes] == expected
         assert sum(m.GetTriangleCount() for m in meshes) == 36
@@ -199,23 +190,20 @@ def spoilt(value: float) -> Mesh:
         ([], BadInput, "no bodies"),
         (broken(mesh=Mesh(np.zeros((3, 3)), np.zeros((0, 3), np.int32))), BadInput, "no triangles"),
         (broken(mesh=spoilt(float("nan"))), OutOfRange, "not finite"),
-        (broken(mesh=spoilt(float("inf"))), OutOfRange, "not finite"),
         (broken(mesh=Mesh(np.zeros((3, 3)), np.array([[0, 1, 3]], np.int32))), BadInput, "a vertex that it lacks"),
         (broken(mesh=Mesh(np.zeros((3, 3)), np.array([[0, 1, -1]], np.int32))), BadInput, "a vertex that it lacks"),
         (broken(mesh=Mesh(np.zeros((3, 3)), np.array([[0, 1, 1]], np.int32))), BadInput, "one corner twice"),
         (broken(extruder=-1), OutOfRange, "below 0"),
         (broken(colour="red"), BadInput, "#rrggbb"),
         (broken(name="a\x00b"), BadInput, "cannot hold"),
-        (broken(name="a\tb"), BadInput, "cannot hold"),
         (broken(material="\ud800"), BadInput, "cannot hold"),
         (broken(settings={"a": "\x0b"}), BadInput, "cannot hold"),
         (broken(name="film"), BadInput, "two bodies"),
     ],
 )
-@pytest.mark.parametrize("family", FAMILIES)
-def test_what_is_refused(family, bodies, error, words):
+def test_what_is_refused(bodies, error, words):
     with pytest.raises(error, match=words):
-        content(family, "t", bodies, (0, 0))
+        content("cura", "t", bodies, (0, 0))
 
 
 def test_more_that_is_refused():

@@ -142,7 +142,7 @@ def test_a_slanted_part_is_narrower_by_a_rounding_all_round():
     assert made.body("corner").volume_mm3() == pytest.approx(0.1 * side**2 / 2, rel=1e-9)
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.3, pi / 4])
+@pytest.mark.parametrize("turn", [0.0, 0.3])
 @pytest.mark.parametrize(("walls", "width", "printed"), [
     ("arachne", 0.11, 0.0), ("arachne", 0.2, 0.34), ("arachne", 0.7, 0.7 - 0.1 * (1 - pi / 4)), ("classic", 0.43, 0.0),
     ("cura", 0.43, 0.0), ("cura", 0.5, 0.44), ("cura", 0.7, 0.61), ("cura", 0.9, 0.9), ("cura-gaps", 0.03, 0.0),
@@ -172,7 +172,7 @@ def test_an_unknown_way_of_walls():
         estimate(tri().printed, tri().machine, tri().layers, "arachn")
 
 
-@pytest.mark.parametrize("end_mm", [0.001, 0.15, 0.3, 0.42, 0.9, 1.0, 1.2, 1.95, 1.98, 2.1, 2.25, 2.399])
+@pytest.mark.parametrize("end_mm", [0.001, 0.3, 1.2, 1.98, 2.399])
 def test_a_window_is_one_period_wherever_the_sensor_ends(end_mm):
     """Also where its end is an edge of a layer, but for rounding."""
     size = {"length_mm": 33 * 2.4 + end_mm, "period_mm": 2.4, "lower_height_mm": 0.2, "dielectric_mm": 0.2}

@@ -245,10 +245,3 @@ def test_sparse_infill_thins_the_film_and_not_what_is_walls_alone(real):
     assert sparse["film_and_lower", 4] < 0.85 * full["film_and_lower", 4]
     for layer in (7, 8, 9):
         assert sparse["hanging_dielectric", layer] == pytest.approx(full["hanging_dielectric", layer], rel=1e-3)
-
-
-def test_sparse_infill_leaves_air_in_the_printed_scene(printed):
-    (_, solid), (_, sparse) = (printed("arachne", v) for v in (small(), small(infill={"x60": {"percent": 50}})))
-    cells = [p.cell.scene for p in (solid, sparse)]
-    filled = [cell.body("film_and_lower").volume_mm3() for cell in cells]
-    assert filled[1] < 0.95 * filled[0]

@@ -36,10 +36,9 @@ def test_a_sensor_that_fits_the_other_way_round_is_told_so():
     assert "swap length and width" in found.advice
 
 
-@pytest.mark.parametrize("shape", ["tri", "rect", "reference"])
-def test_the_insole_of_the_thesis_is_refused_with_the_size_of_the_bed(shape):
+def test_the_insole_of_the_thesis_is_refused_with_the_size_of_the_bed():
     """330 x 330 mm do not fit on 390 x 170 (files-and-slicers.md); the other printer takes them."""
-    design = make({"shape": shape, "parameters": {"length_mm": 330.0, "width_mm": 330.0}})
+    design = make({"shape": "tri", "parameters": {"length_mm": 330.0, "width_mm": 330.0}})
     (found,) = review(design).findings
     assert (found.rule, found.severity) == ("8-bed", "error")
     assert "330 x 330 mm" in found.message

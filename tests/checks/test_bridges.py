@@ -74,12 +74,6 @@ def test_any_body_below_supports(sensor, findings):
     assert findings(filled, "9-") == []
 
 
-def test_the_shorter_way_over_a_trench_counts(sensor, findings):
-    """A trench of 3 x 20 mm is bridged across, not along."""
-    (found,) = findings(sensor(*walls((2, 4), (7, 12))), "9-")
-    assert found.value_mm == pytest.approx(3.0)
-
-
 def test_a_hole_is_bridged_over_its_narrow_side(sensor, findings):
     """A hole of 4 x 1 mm in a block of 10 x 10."""
     around = ((2, 12, 2, 5), (2, 12, 6, 12), (2, 4, 5, 6), (8, 12, 5, 6))
@@ -151,11 +145,10 @@ def test_upside_down_the_lower_triangles_start_in_mid_air(along):
     assert "support" in found.advice
 
 
-@pytest.mark.parametrize("support", ["bvoh", "pla"])
 @pytest.mark.parametrize("shape", ["tri", "rect"])
 @pytest.mark.parametrize("orientation", ["as-drawn", "upside-down"])
-def test_with_support_nothing_is_printed_over_air(shape, support, orientation):
-    assert reviewed(shape=shape, parameters=SMALL, orientation=orientation, materials={"support": support}) == []
+def test_with_support_nothing_is_printed_over_air(shape, orientation):
+    assert reviewed(shape=shape, parameters=SMALL, orientation=orientation, materials={"support": "bvoh"}) == []
 
 
 # Strips of 0.7 over air of 0.3 are bridges that a bead spans; wider air is a bridge to warn of.

@@ -26,7 +26,7 @@ def test_a_face_off_the_grid_is_a_warning(sensor, findings, top_mm, off):
 
 
 # Faces come out at the boundary after the last sample below them.
-@pytest.mark.parametrize(("top_mm", "printed_mm"), [(1.54, 0.3), (1.56, 0.4), (1.51, 0.3), (1.59, 0.4)])
+@pytest.mark.parametrize(("top_mm", "printed_mm"), [(1.54, 0.3), (1.56, 0.4)])
 def test_the_printed_thickness_is_told(sensor, findings, top_mm, printed_mm):
     (found,) = findings(sensor(patch(1.2, top_mm)), "3-", "patch")
     assert f"prints {printed_mm:g} mm thick instead of {top_mm - 1.2:g}" in found.message
@@ -40,12 +40,11 @@ def test_the_grid_starts_with_the_first_layer(sensor, findings, fine):
     assert findings(sensor(bottom_mm=0.35), "3-", quality=thick_first) == []
 
 
-@pytest.mark.parametrize(("film_mm", "drawn", "printed"), [(0.1, 0.34, 0.3), (0.2, 0.44, 0.4)])
-def test_triangles_of_0_24_print_as_0_20(findings, film_mm, drawn, printed):
+def test_triangles_of_0_24_print_as_0_20(findings):
     """Measured (files-and-slicers.md): film and triangles together."""
-    scene = tri.scene(tri.Params(length_mm=8.0, width_mm=4.0, dielectric_mm=film_mm), Fill())
+    scene = tri.scene(tri.Params(length_mm=8.0, width_mm=4.0, dielectric_mm=0.1), Fill())
     (found,) = findings(scene, "3-", "film_and_lower")
-    assert f"prints {printed:g} mm thick instead of {drawn:g}" in found.message
+    assert "prints 0.3 mm thick instead of 0.34" in found.message
 
 
 # Samples lie at 1.25, 1.35, ...: a part of the body from 1.26 to 1.34 is met by none.
@@ -95,10 +94,3 @@ def test_an_apex_short_of_mid_height_is_a_warning(sensor, findings):
     ridge = Body("patch", "pla", (Prism("y", ((5, 1.2), (10, 1.2), (7.5, 1.44)), 0.0, 20.0),))
     (found,) = findings(sensor(ridge), "4-", "patch")
     assert (found.severity, found.layer, found.value_mm) == ("warning", 15, 0.04)
-
-
-def test_extra_fine_layers_move_the_samples(sensor, findings, extrafine):
-    """From 1.26 to 1.34: three samples of 0.06 mm layers lie between 1.2 and 1.38, at 1.23, 1.29 and 1.35."""
-    scene = sensor(patch(1.26, 1.34))
-    assert [f.severity for f in findings(scene, "4-", "patch")] == ["error"]
-    assert [f.severity for f in findings(scene, "4-", "patch", quality=extrafine)] == ["warning"]

@@ -32,35 +32,22 @@ def test_good_files_pass_with_their_warnings(text, warned):
     assert {f.rule for f in result.findings if f.severity == "warning"} == warned
 
 
-def test_warnings_name_what_is_missing():
-    said = [f.message for f in check(MAKER.splitlines(), DIABASE).findings]
-    assert any("no command for the bed" in text for text in said)
-    assert any("M106 names no fan" in text for text in said)
-    assert any("no G90" in f.message for f in check(LAB.splitlines(), DIABASE).findings)
-
-
 # Text of the good file, the line to change, what to make of it, the rule that must refuse it; what is not planted in
 # a slicer's file by tests/slicers/planted.py.
 PLANTED = [
     ("reach", OWN, "G1 X5 Y5 F7200", "G1 X209 Y5 F7200"),
-    ("reach", OWN, "G1 X5 Y5 F7200", "G1 X-208.1 Y5 F7200"),
-    ("reach", OWN, "G1 X5 Y5 F7200", "G1 X5 Y90.1 F7200"),
     ("reach", OWN, "G1 X5 Y5 F7200", "G1 X5 Y-91 F7200"),
     ("reach", OWN, "G1 Z.2 F3000", "G1 Z211 F3000"),
     ("reach", OWN, "G1 Z.1 F3000", "G1 Z-.1 F3000"),
     ("reach", LAB, "G3 X18.100 Y-3.900 I0.000 J0.500 E0.0575 F1800", "G3 X18.1 Y-4.9 I0 J95.2 E0.5 F1800"),
     ("bed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X196 Y5 E.2 F1200"),
-    ("bed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y-86 E.2 F1200"),
     ("bed", OWN, "G1 Z.2 F3000", "G1 Z205 F3000"),
     ("below", OWN, "G1 Z.2 F3000", "G28\nG32\nG1 Z.05 F3000"),
     ("below", OWN, "G1 Z.2 F3000", "G92 E0\nG1 Z.05 F3000"),
-    ("below", MAKER, "G1 Z.4 F3000", "G1 Z0.100 F3000"),
     ("cold", OWN, "G10 P4 S230 R180", "G10 P4 R180"),
     ("cold", OWN, "M568 P4 A2", "G10 P4 S120"),
     ("cold", OWN, "M116 P4", "M568 P4 A0\nG10 P4 S230"),
     ("cold", OWN, "M568 P4 A2", "M104 T4 S0"),
-    ("cold", MAKER, "G10 P4 R184 S228", "G10 P5 R184 S228"),
-    ("cold", LAB, "G10 P1 R175 S200", "G10 P2 R175 S200"),
     ("tool", OWN, "T4", "T0"),
     ("tool", OWN, "T3", ""),
     ("tool", OWN, "M568 P4 A2", "M568 P7 A2"),
@@ -72,10 +59,8 @@ PLANTED = [
     ("absolute-e", OWN, "M501", "M82"),
     ("temperature", OWN, "G10 P4 S230 R180", "G10 P4 S251 R180"),
     ("temperature", OWN, "G10 P4 S230 R180", "G10 P4 S230 R260"),
-    ("temperature", OWN, "M568 P4 A2", "M104 T4 S300"),
     ("temperature", OWN, "M568 P4 A2", "M109 S230"),
     ("temperature", OWN, "M190 S75 ; set bed temperature", "M190 S121"),
-    ("temperature", LAB, "M140 S60", "M140 S121"),
     ("home", OWN, "G28\nG32", "G32\nG28"),
     ("home", LAB, "G28\nG32", "G28 X Y\nG29"),
     ("home", OWN, "T4", "M84\nT4"),
@@ -124,12 +109,10 @@ def test_a_planted_fault_is_refused(rule, text, old, new):
         (OWN, "M568 P4 A2", "G91\nG1 Z5\nG1 Z-5\nG90"),
         (OWN, "M568 P4 A2", "M568 P4 A0"),
         (OWN, "M116 P4", "M568 P4 A0\nM104 T4 S230"),
-        (OWN, "M106 P3 S255", "M106 S255"),
         (OWN, "M568 P4 A2", 'M291 P"Go on; it\'s fine?" S3'),
         (OWN, "M116", "M25"),
         (OWN, "T4", "M221 S100\nM221\nM290 S0 R0\nM220 S100\nG17\nM204 P500\nM572 D1 S0\nM117 Layer 2; half\nT4"),
         (OWN, "G1 X15 Y5 E.2 F1200", "G1 Z.1 E9 F6000"),
-        (MAKER, "G1 E6.00 F3000", "G1 E6.00 F6001"),
         (LAB, "G1 Z0.850 E-5.0000 F4800", "G1 Z0.850 E-5.0000 F9000"),
         (OWN, "M0 H1", "M0 H1\nM81"),
         (OWN, "G1 X5 Y5 F7200", "G10\nG1 X5 Y5 F7200\nG11"),
@@ -138,7 +121,7 @@ def test_a_planted_fault_is_refused(rule, text, old, new):
         (OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y5 E.2 F12000"),
         (OWN, "G28\nM501", "G1 Z210\nG28\nM501"),
         (OWN, "M83", "M83\nG92 E0"),
-        (OWN, "M84" if "M84" in OWN else "M501", "M84"),
+        (OWN, "M501", "M84"),
         (OWN, "T4", "T4\nT4"),
         (OWN, "T4", "T-1\nT4"),
         (OWN, ";TYPE:Custom", "; printed at 210 \N{DEGREE SIGN}C"),

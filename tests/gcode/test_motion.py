@@ -16,33 +16,9 @@ from sensorgen.export.gcode.words import effect, parse
 R = "M83"
 
 
-def test_starts_are_where_the_last_move_ended():
-    motion = follow([R, "G1 X1", "G92 X5", "G1 X6", "G28 Y", "G1 Y2"])
-    assert motion.start_mm[:, 0].tolist() == [0, 5, 6]
-    assert motion.length_mm.tolist() == [1, 1, 2]
-    assert follow([R, "G1 Z1", "G92 Y9 Z5", "G1 Z6", "G1 Y10"]).length_mm.tolist() == [1, 1, 1]
-    assert follow([R, "G1 X1 Y1 Z1", "G92", "G1 X3"]).length_mm[1] == 3
-
-
 def test_homing_without_an_axis_is_homing_of_all():
     assert follow([R, "G1 X1 Y2 Z3", "G28", "G1 X4"]).start_mm[-1].tolist() == [0, 0, 0]
     assert follow([R, "G1 X1 Y2 Z3", "G28 Z", "G1 X4"]).start_mm[-1].tolist() == [1, 2, 0]
-
-
-@pytest.mark.parametrize(
-    "lines",
-    [
-        ["M83", "G1 X1 E2", "G1 X2 E-3", "G1 X3 E3", "G1 X4 E.5"],
-        ["M82", "G1 X1 E2", "G1 X2 E-1", "G1 X3 E2", "G1 X4 E2.5"],
-        ["M82", "G1 X1 E2", "G92 E0", "G1 X2 E-3", "G1 X3 E0", "G92 E7", "G1 X4 E7.5"],
-        ["m83", "g1x1e2", "G1 E-3 X2 ", "N5 G1 X3 E3", "G01 X4 E0.5"],
-    ],
-)
-def test_filament_relative_and_absolute(lines):
-    motion = follow(lines)
-    assert motion.filament_mm.tolist() == [2, -3, 3, 0.5]
-    assert motion.extruded_mm.tolist() == [2, 0, 0, 0.5]
-    assert motion.end_mm[:, 0].tolist() == [1, 2, 3, 4]
 
 
 def test_a_macro_may_take_the_tool():
@@ -100,7 +76,7 @@ def test_an_arc_turns_the_right_way_and_reaches_as_far_as_its_chords(line, low, 
     assert np.hypot(*(end - start)[:, :2].T).sum() == pytest.approx(motion.across_mm[1], rel=1e-3)
 
 
-@pytest.mark.parametrize("radius", [0.003, 0.05, 1.0, 80.0, 5e4])
+@pytest.mark.parametrize("radius", [0.003, 1.0, 5e4])
 def test_chords_stay_near_their_arc(radius):
     motion = follow([R, f"G1 X{radius:.4f}", f"G3 I{-radius:.4f} E2", f"G2 I{-radius:.4f} E2"])
     which, start, end = motion.arcs.chords()
@@ -192,7 +168,7 @@ MODES = st.sampled_from(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(st.lists(st.one_of(MOVES, MOVES, MOVES, MODES), max_size=40))
 def test_moves_read_all_at_once_are_those_read_one_by_one(lines):
     """A bracket with nothing in it makes a line one that is read word by word, and changes nothing."""

@@ -41,11 +41,9 @@ def test_a_material_may_be_named_and_none_means_no_mass():
     ("lines", "expected"),
     [
         (["G1 X10 F600"], 1.0),
-        (["G1 X30 Y40 F3000"], 1.0),
         (["G1 X200 F99999"], 1.0),  # the axis is slower
         (["G1 Z50 F12000"], 1.0),
         (["G1 E10 F600"], 1.0),
-        (["G1 E100 F99999"], 1.0),
         (["G1 X1 E100 F99999"], 1.0),
         (["G4 S1"], 1.0),
         (["G4 P1000"], 1.0),

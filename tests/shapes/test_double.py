@@ -22,20 +22,9 @@ def test_its_volumes_are_length_times_width_times_thickness():
     assert found.size_mm == (100.0, 10.0, pytest.approx(1.95))
 
 
-def test_its_electrodes_lie_in_order():
-    electrodes = [(b.terminal, b.pieces[0].span("z")) for b in scene().bodies if b.terminal]
-    assert [terminal for terminal, _ in electrodes] == ["bottom", "middle", "top"]
-    assert [z for _, z in electrodes] == [pytest.approx(z) for z in [(0.0, 0.3), (0.9, 1.2), (1.8, 2.1)]]
-
-
 def test_each_film_has_its_own_part():
-    found = double.scene(double.Params(), Fill(film="pla", dielectric="x60"))
-    assert (found.body("lower_dielectric").material, found.body("upper_dielectric").material) == ("pla", "x60")
-
-
-def test_its_middle_electrode_is_of_the_top_ones_material():
-    found = double.scene(double.Params(), Fill(bottom_electrode="first", top_electrode="second"))
-    assert [b.material for b in found.bodies if b.terminal] == ["first", "second", "second"]
+    found = double.scene(double.Params(), Fill("first", "second", film="pla", dielectric="x60"))
+    assert [b.material for b in found.bodies] == ["first", "pla", "second", "x60", "second"]
 
 
 def test_the_columns_refuse_three_electrodes_and_say_who_speaks_of_them():

@@ -5,28 +5,25 @@ import builtins
 import configparser
 import json
 import math
-import struct
 import subprocess
-import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
 
 import extruded
+import numpy as np
 import pytest
+from loaded import DIABASE, FINE, both_printers, both_qualities, ini, usual
 
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design import materials
-from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names, tower
+from sensorgen.design.printer import Printer, tower
 from sensorgen.export.slicers import cura, prusa, versions
 from sensorgen.export.slicers import cura as curaengine
 from sensorgen.export.slicers.loads import ToolLoad
-
-DIABASE = load_printer("diabase-h5")
-FINE = load_quality("fine")
-both_printers = pytest.mark.parametrize(
-    "printer", [load_printer(name) for name in printer_names()], ids=lambda p: p.name
-)
-both_qualities = pytest.mark.parametrize("quality", [load_quality(n) for n in quality_names()], ids=lambda q: q.name)
+from sensorgen.export.slicers.run import content
+from sensorgen.export.threemf import Part, plate
+from sensorgen.scene.geometry.meshes import Mesh, mesh
+from sensorgen.scene.scene import Body, Point, box
 
 prusa_versions = pytest.mark.parametrize("prusa_version", ["own", "newer"], indirect=True)
 cura_versions = pytest.mark.parametrize("cura_version", ["own", "newer"], indirect=True)
@@ -39,62 +36,18 @@ INSIDE = (SIZE_MM[0] - WALLS_MM) * (SIZE_MM[1] - WALLS_MM) / (SIZE_MM[0] * SIZE_
 HALF = pytest.approx(1 - INSIDE / 2, abs=0.04)  # infill 50 %, less at the ends of its lines
 STEP_MM = 0.6  # a whole number of layers in both qualities
 
-TRIANGLES = (
-    (0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4),
-    (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7),
-)  # fmt: skip
 
-Corners = list[tuple[float, float, float]]
-
-
-def box(low_mm: float, high_mm: float, centre: tuple[float, float] = (0.0, 0.0)) -> Corners:
-    """Corners of a box of SIZE_MM between two heights."""
-    (cx, cy), (wide, deep) = centre, SIZE_MM
-    plan = [(cx + sx * wide / 2, cy + sy * deep / 2) for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    return [(x, y, z) for z in (low_mm, high_mm) for x, y in plan]
+def block(low_mm: float, high_mm: float, centre: Point = (0.0, 0.0), x_mm: Point = (-10.0, 10.0)) -> Mesh:
+    """A box of SIZE_MM between two heights, or a part of it."""
+    (x, y), half = centre, SIZE_MM[1] / 2
+    return mesh(Body("", "", (box(x + x_mm[0], x + x_mm[1], y - half, y + half, low_mm, high_mm),)))
 
 
-def write_stl(path: Path, corners: Corners) -> Path:
-    facets = [struct.pack("<12fH", 0, 0, 0, *(c for i in t for c in corners[i]), 0) for t in TRIANGLES]
-    path.write_bytes(bytes(80) + struct.pack("<I", len(facets)) + b"".join(facets))
+def write_3mf(path: Path, bodies: list[tuple[Mesh, int, dict[str, str]]]) -> Path:
+    """Bodies, each with its extruder from 1 and settings of its own."""
+    parts = [Part(f"body {n}", "m", "#000000", at - 1, each, own) for n, (each, at, own) in enumerate(bodies)]
+    path.write_bytes(plate("prusa", "t", parts, (0.0, 0.0)))
     return path
-
-
-def write_3mf(path: Path, bodies: list[tuple[Corners, int, dict[str, str]]]) -> Path:
-    """One object with one mesh; triangle ranges say which extruder (from 1) prints what, and how."""
-    vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for b, _, _ in bodies for x, y, z in b)
-    corners = ([8 * n + corner for corner in t] for n in range(len(bodies)) for t in TRIANGLES)
-    triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in corners)
-    volumes = ""
-    for n, (_, extruder, settings) in enumerate(bodies):
-        own = {"name": f"body {n}", "extruder": str(extruder)} | settings
-        rows = "".join(f'<metadata type="volume" key="{k}" value="{v}"/>' for k, v in own.items())
-        volumes += f'<volume firstid="{12 * n}" lastid="{12 * n + 11}">{rows}</volume>'
-    package = "http://schemas.openxmlformats.org/package/2006"
-    parts = {
-        "[Content_Types].xml": f'<Types xmlns="{package}/content-types">'
-        '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
-        '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>',
-        "_rels/.rels": f'<Relationships xmlns="{package}/relationships">'
-        '<Relationship Target="/3D/3dmodel.model" Id="r1" '
-        'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>',
-        "3D/3dmodel.model": '<model unit="millimeter" '
-        'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2013/02" '
-        'xmlns:slic3rpe="http://schemas.slic3r.org/3mf/2017/06"><metadata name="slic3rpe:Version3mf">1</metadata>'
-        f'<resources><object id="1" type="model"><mesh><vertices>{vertices}</vertices>'
-        f"<triangles>{triangles}</triangles></mesh></object></resources>"
-        '<build><item objectid="1"/></build></model>',
-        "Metadata/Slic3r_PE_model.config": f'<config><object id="1" instances_count="1">{volumes}</object></config>',
-    }
-    with zipfile.ZipFile(path, "w") as file:
-        for name, text in parts.items():
-            file.writestr(name, '<?xml version="1.0" encoding="UTF-8"?>' + text)
-    return path
-
-
-def usual(printer: Printer, **dielectric: object) -> dict[int, ToolLoad]:
-    tools, etpu, x60 = printer.default_tools, materials.load("etpu"), materials.load("x60")
-    return {tools["etpu"]: ToolLoad(etpu), tools["x60"]: ToolLoad(x60, **dielectric)}
 
 
 def read(path: Path, printer: Printer) -> extruded.Extruded:
@@ -125,19 +78,14 @@ def towers(path: Path, kind: str) -> list[tuple[float, float]]:
 # --- PrusaSlicer ------------------------------------------------------------------------------------------
 
 
-def ini(text: str) -> dict[str, str]:
-    lines = (line.partition("=") for line in text.splitlines() if "=" in line and not line.startswith("#"))
-    return {key.strip(): value.replace('"', "").strip() for key, _, value in lines}
-
-
 def ignored(program: str, text: str, folder: Path) -> list[str]:
     """Keys of a profile that PrusaSlicer does not keep as they are: unknown, misspelt or of another form."""
     (folder / "in.ini").write_text(text)
     subprocess.run(
         [program, "--load", str(folder / "in.ini"), "--save", str(folder / "out.ini")], check=True, capture_output=True
     )
-    kept = ini((folder / "out.ini").read_text())
-    return [key for key, value in ini(text).items() if kept.get(key) != value]
+    given, kept = (ini(each.replace('"', "")) for each in (text, (folder / "out.ini").read_text()))
+    return [key for key, value in given.items() if kept.get(key) != value]
 
 
 @prusa_versions
@@ -166,7 +114,7 @@ def test_prusa_prints_each_box_with_its_tool(prusa_slicer, printer, quality, tmp
     loads = usual(printer)
     low, high = (printer.slicer_index(printer.default_tools[name]) for name in ("etpu", "x60"))
     centre = printer.bed_centre_mm()
-    bodies = [(box(k * STEP_MM, (k + 1) * STEP_MM, centre), at + 1, {}) for k, at in enumerate((low, high, low))]
+    bodies = [(block(k * STEP_MM, (k + 1) * STEP_MM, centre), at + 1, {}) for k, at in enumerate((low, high, low))]
     result = slice_with_prusa(printer, quality, loads, bodies, tmp_path)
     found = read(result, printer)
     assert found.tools == (low, high, low)
@@ -184,7 +132,7 @@ def test_prusa_bodies_carry_their_infill_walls_and_speed(prusa_slicer, tmp_path)
     loads = {3: ToolLoad(materials.load("etpu")), 4: thin}
     own = prusa.volume_settings(DIABASE, FINE, 4, thin) | {"external_perimeter_speed": "12"}
     # A film of two layers between electrodes: nothing of it is skin, so its share of infill counts in full.
-    bodies = [(box(0, 0.6), 3, {}), (box(0.6, 0.8), 4, own), (box(0.8, 1.4), 3, {})]
+    bodies = [(block(0, 0.6), 3, {}), (block(0.6, 0.8), 4, own), (block(0.8, 1.4), 3, {})]
     result = slice_with_prusa(DIABASE, FINE, loads, bodies, tmp_path)
     full = fullness(read(result, DIABASE), {2: 1.2, 3: 0.2})
     assert full == {2: SOLID, 3: HALF}
@@ -192,10 +140,8 @@ def test_prusa_bodies_carry_their_infill_walls_and_speed(prusa_slicer, tmp_path)
 
 
 def test_prusa_bridges_over_air_with_lines_of_usual_width(prusa_slicer, tmp_path):
-    posts = [box(0, STEP_MM), box(0, STEP_MM)]
-    posts[0] = [(x if x < 0 else -8.0, y, z) for x, y, z in posts[0]]
-    posts[1] = [(x if x > 0 else 8.0, y, z) for x, y, z in posts[1]]
-    bodies = [(posts[0], 3, {}), (posts[1], 3, {}), (box(STEP_MM, 2 * STEP_MM), 4, {})]
+    posts = [block(0, STEP_MM, x_mm=ends) for ends in ((-10.0, -8.0), (8.0, 10.0))]
+    bodies = [(posts[0], 3, {}), (posts[1], 3, {}), (block(STEP_MM, 2 * STEP_MM), 4, {})]
     found = read(slice_with_prusa(DIABASE, FINE, usual(DIABASE), bodies, tmp_path), DIABASE)
     assert found.volume_mm3[(3, "bridge infill")] > 0
     assert fullness(found, {2: STEP_MM * 0.2, 3: STEP_MM})[3] == SOLID  # 1.21 with thick bridges, on the bridging layer
@@ -203,10 +149,7 @@ def test_prusa_bridges_over_air_with_lines_of_usual_width(prusa_slicer, tmp_path
 
 @pytest.mark.parametrize(("gap_mm", "islands"), [(0.0, 1), (0.05, 2)])
 def test_prusa_keeps_gaps_and_joins_what_touches(prusa_slicer, tmp_path, gap_mm, islands):
-    halves = [
-        [(x if x < 0 else -gap_mm / 2, y, z) for x, y, z in box(0, STEP_MM)],
-        [(x if x > 0 else gap_mm / 2, y, z) for x, y, z in box(0, STEP_MM)],
-    ]
+    halves = [block(0, STEP_MM, x_mm=ends) for ends in ((-10.0, -gap_mm / 2), (gap_mm / 2, 10.0))]
     load = {3: ToolLoad(materials.load("etpu"))}
     result = slice_with_prusa(DIABASE, FINE, load, [(half, 3, {}) for half in halves], tmp_path)
     layers = round(STEP_MM / FINE.layer_mm)
@@ -214,7 +157,9 @@ def test_prusa_keeps_gaps_and_joins_what_touches(prusa_slicer, tmp_path, gap_mm,
 
 
 def test_prusa_single_tool_needs_no_tower(prusa_slicer, tmp_path):
-    result = slice_with_prusa(DIABASE, FINE, {4: ToolLoad(materials.load("x60"))}, [(box(0, STEP_MM), 4, {})], tmp_path)
+    result = slice_with_prusa(
+        DIABASE, FINE, {4: ToolLoad(materials.load("x60"))}, [(block(0, STEP_MM), 4, {})], tmp_path
+    )
     found = read(result, DIABASE)
     assert found.tools == (3,)
     assert not any(kind == "wipe tower" for _, kind in found.volume_mm3)
@@ -223,7 +168,7 @@ def test_prusa_single_tool_needs_no_tower(prusa_slicer, tmp_path):
 def test_prusa_is_quoted_when_it_refuses(prusa_slicer, tmp_path):
     text = prusa.profile(DIABASE, FINE, usual(DIABASE)).replace("fill_pattern = rectilinear", "fill_pattern = wobbly")
     (tmp_path / "p.ini").write_text(text)
-    model = write_3mf(tmp_path / "p.3mf", [(box(0, STEP_MM), 3, {})])
+    model = write_3mf(tmp_path / "p.3mf", [(block(0, STEP_MM), 3, {})])
     with pytest.raises(SlicerFailed, match="wobbly"):
         prusa.slice_3mf(model, tmp_path / "p.ini", tmp_path / "p.gcode")
     with pytest.raises(SlicerFailed, match="there is no file"):
@@ -234,7 +179,9 @@ def test_prusa_is_quoted_when_it_refuses(prusa_slicer, tmp_path):
 
 
 def slice_with_cura(printer, quality, loads, bodies, folder):
-    stls = [(write_stl(folder / f"{n}.stl", corners), index) for n, (corners, index) in enumerate(bodies)]
+    stls = [(folder / f"{n}.stl", index) for n, (_, index) in enumerate(bodies)]
+    for (path, _), (body, _) in zip(stls, bodies, strict=True):
+        path.write_bytes(content(body, np.zeros(3)))
     result = folder / "c.gcode"
     curaengine.slice_bodies(stls, curaengine.engine_settings(printer, quality, loads), result)
     return result
@@ -244,7 +191,7 @@ def slice_with_cura(printer, quality, loads, bodies, folder):
 @both_qualities
 def test_cura_prints_each_box_with_its_tool(cura_engine, printer, quality, tmp_path):
     low, high = (printer.slicer_index(printer.default_tools[name]) for name in ("etpu", "x60"))
-    bodies = [(box(k * STEP_MM, (k + 1) * STEP_MM), tool) for k, tool in enumerate((low, high, low))]
+    bodies = [(block(k * STEP_MM, (k + 1) * STEP_MM), tool) for k, tool in enumerate((low, high, low))]
     result = slice_with_cura(printer, quality, usual(printer), bodies, tmp_path)
     found = read(result, printer)
     # The tower's outline is always printed by the first tool, so the tools alternate where one would do.
@@ -263,7 +210,7 @@ def test_cura_prints_each_box_with_its_tool(cura_engine, printer, quality, tmp_p
 
 
 def test_cura_infill_reaches_a_film(cura_engine, tmp_path):
-    bodies = [(box(0, 0.6), 2), (box(0.6, 0.8), 3), (box(0.8, 1.4), 2)]
+    bodies = [(block(0, 0.6), 2), (block(0.6, 0.8), 3), (block(0.8, 1.4), 2)]
     result = slice_with_cura(DIABASE, FINE, usual(DIABASE, infill_percent=50.0), bodies, tmp_path)
     full = fullness(read(result, DIABASE), {2: 1.2, 3: 0.2})
     assert full == {2: SOLID, 3: HALF}
@@ -271,7 +218,7 @@ def test_cura_infill_reaches_a_film(cura_engine, tmp_path):
 
 def test_cura_two_tools_of_a_two_tool_printer(cura_engine, tmp_path):
     two = DIABASE.model_copy(update={"tool_numbers": (7, 9), "default_tools": {"etpu": 9, "x60": 7}})
-    result = slice_with_cura(two, FINE, usual(two), [(box(0, STEP_MM), 1), (box(STEP_MM, 1.2), 0)], tmp_path)
+    result = slice_with_cura(two, FINE, usual(two), [(block(0, STEP_MM), 1), (block(STEP_MM, 1.2), 0)], tmp_path)
     assert set(read(result, two).tools) == {0, 1}
 
 

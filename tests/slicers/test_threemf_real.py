@@ -2,18 +2,22 @@
 
 import io
 import json
-import re
 import shutil
 import subprocess
 import zipfile
-from collections import defaultdict
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 import pytest
+from loaded import DIABASE
 
+from sensorgen.export.gcode import motion as paths
+from sensorgen.export.gcode.motion import Paths
 from sensorgen.export.threemf import Part, content
-from sensorgen.scene.geometry.meshes import Mesh
+from sensorgen.scene import scene
+from sensorgen.scene.geometry.meshes import Mesh, mesh
+from sensorgen.scene.scene import Body
 
 CONFIG = "Metadata/Slic3r_PE_model.config"
 
@@ -47,11 +51,7 @@ print(json.dumps([tell(node) for node in scene.getSceneNodes()]))
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Mesh:
     """A closed box between two corners [mm]."""
-    x, y, z = zip(low, high, strict=True)
-    corners = np.array([[a, b, c] for a in x for b in y for c in z], dtype=float)
-    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    triangles = [t for a, b, c, d in sides for t in ([a, b, c], [a, c, d])]
-    return Mesh(corners, np.array(triangles, dtype=np.int32))
+    return mesh(Body("", "", (scene.box(*map(float, chain.from_iterable(zip(low, high, strict=True)))),)))
 
 
 def stacked() -> list[Part]:
@@ -71,35 +71,17 @@ def beside() -> list[Part]:
     ]
 
 
-def printed(program: str, packed: bytes, folder: Path) -> dict[int, list[tuple[float, float, float, float]]]:
-    """Ends of the extruding moves of each tool: X, Y, Z of the layer's top [mm] and filament [mm]."""
+def printed(program: str, packed: bytes, folder: Path) -> dict[int, Paths]:
+    """Lines of each tool, by the printer's own number, from 1."""
     source, settings, target = folder / "a.3mf", folder / "a.ini", folder / "a.gcode"
     source.write_bytes(packed)
     settings.write_text(INI)
     command = [program, "--export-gcode", "--load", settings, "--dont-arrange", "--output", target, source]
     run = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
     assert run.returncode == 0, run.stderr[-2000:]
-    return moves(target.read_text())
-
-
-def moves(gcode: str) -> dict[int, list[tuple[float, float, float, float]]]:
-    by_tool = defaultdict(list)
-    tool, at = 0, {"X": 0.0, "Y": 0.0, "Z": 0.0, "E": 0.0}
-    for line in gcode.splitlines():
-        code = line.partition(";")[0].split()
-        if not code:
-            continue
-        if match := re.fullmatch(r"T(\d+)", code[0]):
-            tool = int(match[1])
-        words = {w[0]: float(w[1:]) for w in code[1:] if w[0] in at}
-        if code[0] == "G92":
-            at.update(words)
-        elif code[0] in ("G0", "G1"):
-            filament = words.get("E", at["E"]) - at["E"]
-            at.update(words)
-            if filament > 0 and "X" in words:
-                by_tool[tool].append((at["X"], at["Y"], at["Z"], filament))
-    return dict(by_tool)
+    lines = paths.read(target, DIABASE, "slicer")
+    lines = lines.of(lines.length_mm() > 0)
+    return {tool: lines.of(lines.tool == tool) for tool in np.unique(lines.tool).tolist()}
 
 
 def without_config(packed: bytes) -> bytes:
@@ -114,28 +96,26 @@ def without_config(packed: bytes) -> bytes:
 
 def test_two_stacked_bodies_each_on_their_tool(prusa_slicer, tmp_path):
     found = printed(prusa_slicer, content("prusa", "two", stacked(), (0, 0)), tmp_path)
-    assert set(found) == {2, 3}
-    heights = {tool: [round(move[2], 3) for move in ends] for tool, ends in found.items()}
-    assert (min(heights[2]), max(heights[2])) == (0.2, 1.0)
-    assert (min(heights[3]), max(heights[3])) == (1.2, 2.0)
+    heights = {tool: lines.end_mm[:, 2].round(3) for tool, lines in found.items()}
+    assert {tool: (z.min(), z.max()) for tool, z in heights.items()} == {3: (0.2, 1.0), 4: (1.2, 2.0)}
 
 
 def test_three_touching_bodies_each_on_their_tool(prusa_slicer, tmp_path):
     found = printed(prusa_slicer, content("prusa", "three", beside(), (0, 0)), tmp_path)
-    assert set(found) == {1, 4}
-    low = {tool: [x for x, _, z, _ in ends if z < 1.1] for tool, ends in found.items()}
-    assert max(low[4]) < 0 < min(low[1])
-    assert [tool for tool, ends in found.items() if any(z > 1.1 for _, _, z, _ in ends)] == [4]
+    assert set(found) == {2, 5}
+    low = {tool: lines.end_mm[lines.end_mm[:, 2] < 1.1, 0] for tool, lines in found.items()}
+    assert low[5].max() < 0 < low[2].min()
+    assert [tool for tool, lines in found.items() if lines.end_mm[:, 2].max() > 1.1] == [5]
 
 
 def test_planted_fault_without_config_one_tool_prints_all(prusa_slicer, tmp_path):
     found = printed(prusa_slicer, without_config(content("prusa", "two", stacked(), (0, 0))), tmp_path)
-    assert set(found) == {0}
+    assert set(found) == {1}
 
 
 def test_the_middle_is_where_it_was_asked_to_be(prusa_slicer, tmp_path):
     found = printed(prusa_slicer, content("prusa", "two", stacked(), (-100, 30.5)), tmp_path)
-    ends = np.array([move[:2] for moves_of_tool in found.values() for move in moves_of_tool])
+    ends = np.concatenate([lines.end_mm[:, :2] for lines in found.values()])
     assert (ends.min(axis=0) + ends.max(axis=0)) / 2 == pytest.approx([-100, 30.5], abs=0.02)
 
 
@@ -145,9 +125,9 @@ def test_settings_of_one_body_hold_for_it_alone(prusa_slicer, tmp_path):
         bodies = [Part("a", "m", "#000000", 0, box((0, 0, 0), (20, 20, 4)), {"fill_density": density})]
         bodies += [Part("b", "m", "#000000", 1, box((20, 0, 0), (40, 20, 4)), {"fill_density": "20%"})]
         found = printed(prusa_slicer, content("prusa", "t", bodies, (0, 0)), tmp_path)
-        filament[density] = {tool: sum(move[3] for move in ends) for tool, ends in found.items()}
-    assert filament["90%"][0] > 1.3 * filament["10%"][0]
-    assert filament["90%"][1] == pytest.approx(filament["10%"][1], rel=1e-3)
+        filament[density] = {tool: lines.filament_mm.sum() for tool, lines in found.items()}
+    assert filament["90%"][1] > 1.3 * filament["10%"][1]
+    assert filament["90%"][2] == pytest.approx(filament["10%"][2], rel=1e-3)
 
 
 def test_cura_parser_finds_bodies_names_and_tools(tmp_path):

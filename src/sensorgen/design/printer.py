@@ -261,15 +261,12 @@ def _shipped(kind: type[_Profile], which: Literal["printers", "qualities"], name
 
 @lru_cache(maxsize=64)
 def _parsed(kind: type[_Profile], file: str, text: str) -> _Profile:
+    # as part of the names of other files, and in a slicer's profile
+    safe = re.sub("[^A-Za-z0-9._-]+", "-", Path(file).stem)[:60].strip("._-") or "own"
     try:
-        return checked(kind, {**yamlfile.parse(text, file), "name": _safe(Path(file).stem)})
+        return checked(kind, {**yamlfile.parse(text, file), "name": safe})
     except BadInput as error:
         raise error.within(file) from None
-
-
-def _safe(stem: str) -> str:
-    """A file's name as part of the names of other files, and in a slicer's profile."""
-    return re.sub("[^A-Za-z0-9._-]+", "-", stem)[:60].strip("._-") or "own"
 
 
 PRIME_MM3 = 15.0  # what PrusaSlicer takes a nozzle to need before its pressure is steady

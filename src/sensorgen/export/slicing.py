@@ -241,36 +241,31 @@ def plate_parts(pieces: Sequence[Placed]) -> list[threemf.Part]:
 def plate_3mf(pieces: Sequence[Placed], family: str, title: str) -> bytes:
     """The 3MF of a plate for one family of slicers; see :func:`sensorgen.export.threemf.plate`."""
     check(pieces)
-    design = pieces[0].design
-    by_tool = plate_loads(pieces)
-    primed, text = (
-        tower(design.machine, design.layers, len(by_tool)),
-        prusa.profile(design.machine, design.layers, by_tool),
-    )
-    return threemf.plate(family, title, plate_parts(pieces), _corner_mm(design), primed, text)
+    return _with_profile(pieces, plate_parts(pieces), family, title)[0]
 
 
-def _corner_mm(design: Design) -> tuple[float, float]:
-    """Front left corner of the bed in the printer's own coordinates."""
-    (x, y), (wide, deep) = design.machine.bed_centre_mm(), design.machine.bed_mm
-    return x - wide / 2, y - deep / 2
+def _with_profile(
+    pieces: Sequence[Placed], bodies: list[threemf.Part], family: str, title: str, version: versions.Version = ()
+) -> tuple[bytes, str]:
+    """The 3MF of a plate, and PrusaSlicer's profile in it."""
+    machine, layers, by_tool = pieces[0].design.machine, pieces[0].design.layers, plate_loads(pieces)
+    primed, text = tower(machine, layers, len(by_tool)), prusa.profile(machine, layers, by_tool, version)
+    (x, y), (wide, deep) = machine.bed_centre_mm(), machine.bed_mm  # Cura counts from its front left corner
+    return threemf.plate(family, title, bodies, (x - wide / 2, y - deep / 2), primed, text), text
 
 
 def _run(
     pieces: Sequence[Placed], bodies: list[threemf.Part], slicer: str, raw: Path, runner: Runner, title: str
 ) -> tuple[float, set[str]]:
     """Write what the slicer reads beside its file, and run it: its time [s], and the settings that it does not know."""
-    design, all_loads = pieces[0].design, plate_loads(pieces)
     program = find(*PROGRAMS[slicer], runner.program)
     version = versions.of_program(slicer, program)
     raw.parent.mkdir(parents=True, exist_ok=True)
     if slicer == "prusa":
-        text = prusa.profile(design.machine, design.layers, all_loads, version)
-        primed = tower(design.machine, design.layers, len(all_loads))
         named = title or " ".join(piece.name for piece in pieces)[:80]
-        plate = threemf.plate("prusa", named, bodies, _corner_mm(design), primed, text)
-        return _run_prusa(plate, text, raw, runner)
-    settings = cura.engine_settings(design.machine, design.layers, all_loads, version)
+        return _run_prusa(*_with_profile(pieces, bodies, "prusa", named, version), raw, runner)
+    design = pieces[0].design
+    settings = cura.engine_settings(design.machine, design.layers, plate_loads(pieces), version)
     shift_mm = np.array([-c for c in design.machine.bed_centre_mm()] + [0.0])
     return _run_cura(bodies, settings, shift_mm, raw, replace(runner, program=program))
 
