@@ -75,7 +75,7 @@ def test_a_pause_lifts_the_tip_and_the_press_is_done_again(tmp_path):
     assert lab.mechanism.violations == []
 
 
-PAUSE_S = 12.0
+PAUSE_S = 8.0
 OFTEN = (2.8, 6.5 + PAUSE_S, 12.7 + 2 * PAUSE_S)  # on the way, landing, rest; a press: the test before
 
 
@@ -111,7 +111,7 @@ def test_abort_ends_with_the_tip_up_and_resume_does_the_rest(tmp_path):
 
 @pytest.mark.parametrize(
     ("stop", "reason"),
-    [({"minutes": 0.15}, "stop.minutes"), ({"drift": 1e-9}, "stop.drift")],  # presses: by the command
+    [({"minutes": 0.1}, "stop.minutes"), ({"drift": 1e-9}, "stop.drift")],  # presses: by the command
 )
 def test_rules_end_a_run(tmp_path, stop, reason):
     found = done(tmp_path, laboratory(), {"stop": stop})
@@ -121,7 +121,7 @@ def test_rules_end_a_run(tmp_path, stop, reason):
 
 
 def test_an_absent_operator_ends_a_run(tmp_path):
-    found = done(tmp_path, laboratory(), {"limits": {"operator_min": 0.2}})
+    found = done(tmp_path, laboratory(), {"limits": {"operator_min": 0.1}})
     assert (found.end, found.tip_up) == ("abort", True)
     assert "operator" in found.reason
 
@@ -197,8 +197,7 @@ def test_a_killed_attempt_is_logged_by_the_next_run_without_its_last_incomplete_
 
 
 def test_a_run_that_goes_on_elsewhere_is_left_alone(tmp_path):
-    found, _ = outcome(tmp_path, plan=PLAN[:1])
-    folder = recorder.home(tmp_path / "log.db") / found.folder
+    folder = recorder.new_folder(tmp_path / "log.db")
     with recorder.alone(folder) as ours:
         assert ours
         with pytest.raises(SensorgenError, match="goes on in another process"):
