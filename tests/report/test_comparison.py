@@ -30,8 +30,8 @@ from sensorgen.prediction.plan import without_times
 from sensorgen.prediction.results import to_json
 
 
-@pytest.mark.parametrize("leak", [1e-5, 1e-3, 2e-2])
-@pytest.mark.parametrize("other", [1.0, 0.7, 2.5])
+@pytest.mark.parametrize("leak", [1e-5, 2e-2])
+@pytest.mark.parametrize("other", [1.0, 2.5])
 def test_what_a_meter_reads_of_a_leaking_film(leak, other):
     """Of two electrodes, the other one with ``other`` times the resistance, against a ladder of 400 rungs."""
     along, across = ladder(700.0, leak, 400, other)
@@ -125,7 +125,7 @@ def test_an_anchor_after_a_prediction_is_shown_with_it(tmp_path):
 def test_leakage_by_newton_is_that_of_halving_in_50_digits():
     """Over 30 decades of R_Z over R."""
     mpmath.mp.dps = 50
-    for ratio in np.geomspace(1e-12, 1e18, 301):
+    for ratio in np.geomspace(1e-12, 1e18, 61):
         wanted, low, high = 2 / mpmath.mpf(float(ratio)), mpmath.mpf("1e-12"), mpmath.mpf("1e14")
         while high / low > 1 + mpmath.mpf("1e-30"):
             middle = mpmath.sqrt(low * high)

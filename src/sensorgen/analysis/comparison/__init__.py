@@ -8,7 +8,7 @@ from functools import cache, cached_property, lru_cache
 from math import inf, isfinite, isnan, log, nan
 from typing import NamedTuple, TypeVar
 
-from sensorgen.analysis.comparison.expected import Predicted, stored_or_made
+from sensorgen.analysis.comparison.expected import Movable, Predicted, stored_or_made
 from sensorgen.analysis.comparison.measured import Measured, readings
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.display import Displayed
@@ -131,6 +131,11 @@ class Comparison(Displayed):
         """The last reading of each specimen before the bake, after it, and where that is not known."""
         last = {(row.reading.specimen, row.reading.words.baked): k for k, row in enumerate(self.direct)}
         return self.direct.at(last.values())
+
+    @cached_property
+    def movable(self) -> dict[str, Movable]:
+        """Sensors of which parameters can be moved, by the design's name."""
+        return {name: Movable(body) for name, body in self.bodies.items()}
 
 
 def of_iteration(

@@ -3,7 +3,7 @@
 Specimens are held back: the values come from the others, and the errors before and after are of those held back.
 """
 
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from itertools import chain
@@ -168,7 +168,7 @@ def _fitted(
 ) -> tuple[list[Fitted], list[Untold]]:  # fmt: skip
     """All values and all that stays open; of two values of one quantity the one that is known better."""
     fits = [
-        estimates.of_specimen(one, print_, Movable(comparison.bodies[comparison.names[one.specimen]]))
+        estimates.of_specimen(one, print_, comparison.movable[comparison.names[one.specimen]])
         for one, print_ in data.measured
     ]
     electrodes, film = _electrodes(comparison), design.slot("film")[0].name
@@ -186,15 +186,19 @@ def _fitted(
         if isinstance(one, Fitted):
             before = best.get((one.material, one.quantity), one)
             best[one.material, one.quantity] = min(one, before, key=lambda value: value.high / value.low)
-    open_ = {u.parameter: u for u in reversed(results) if isinstance(u, Untold)}
-    told = {name for name in open_ if any(quantity.startswith(name.split()[0]) for _, quantity in best)}
-    return list(best.values()), [_ACROSS, *(u for name, u in open_.items() if name not in told)]
+    open_ = {u.parameter: u for u in reversed(results) if isinstance(u, Untold) and not _is_told(u, best)}
+    return list(best.values()), [_ACROSS, *open_.values()]
 
 
 def _electrodes(comparison: Comparison) -> list[str]:
     """Materials of all electrodes."""
     parts = ("top_electrode", "bottom_electrode")
     return sorted({body.design.slot(part)[0].name for body in comparison.bodies.values() for part in parts})
+
+
+def _is_told(untold: Untold, values: Iterable[tuple[str, str]]) -> bool:
+    """Test whether a value of this quantity was found by other data."""
+    return any(quantity.startswith(untold.parameter.split()[0]) for _, quantity in values)
 
 
 def with_values(body: Body, values: Sequence[Fitted]) -> Body:
@@ -225,8 +229,8 @@ def _rest_errors(data: _FitData, comparison: Comparison, values: Sequence[Fitted
     for one, _ in data.measured:
         if not one.recorded:
             continue
-        body = comparison.bodies[comparison.names[one.specimen]]
-        sensors = [Movable(of).model.sensor for of in (body, with_values(body, values))]
+        of = comparison.movable[comparison.names[one.specimen]]
+        sensors = [each.model.sensor for each in (of, Movable(with_values(of.body, values)))]
         both = [np.abs(one.data.rest - at_rest(sensor, one.model.frequency_hz)) for sensor in sensors]
         residuals += np.stack(both, 1).tolist()
     yield from _error("Z at rest", residuals)

@@ -137,7 +137,7 @@ def _impedances(comparison: Comparison, recorded: Sequence[RecordedRun]) -> Iter
     for run in recorded:
         name = comparison.names.get(run.entry.specimen)
         if name is not None and np.isfinite(run.rest_ohm).all():
-            of = Movable(comparison.bodies[name])
+            of = comparison.movable[name]
             with suppress(SensorgenError):
                 _ = of.model.sensor
                 known.append((run, of))

@@ -81,9 +81,19 @@ def calibration_findings(calibrations: "Sequence[Calibration]") -> Iterator[str]
         yield from (f"{one.specimen}: {note}." for note in one.notes)
 
 
-_ByFrequency = dict[float, tuple[float, float]]  # C [pF], and its ratio to the predicted one
 _State = tuple[bool | None, str, str]  # bake, defects and remark
 _UNTOLD = None, "", ""  # of a reading of which none is known
+
+
+@dataclass(frozen=True)
+class _Before:
+    """Last reading of a specimen, or its prediction: name, resistances [ohm], C by frequency in its state [pF]."""
+
+    name: str
+    electrode_ohm: float
+    film_ohm: float
+    c_pf: dict[float, float]
+    state: _State | None = None
 
 
 @dataclass(frozen=True)
@@ -109,37 +119,37 @@ def rows(comparison: Comparison, ac: Sequence[AcRow]) -> Lazy[HistoryRow]:
     """A row for each reading of which a bake, shrinkage, a defect or a remark is known and new."""
     measured = by_key((one.number, one) for one in ac)
     shrinkages = {name: body.design.shrinkage for name, body in comparison.bodies.items()}
-    listed, before = [], dict[str, tuple[Compared, _State, dict[float, float]]]()  # the last, its state, C in it [pF]
+    listed, before = [], dict[str, _Before]()
     for row in comparison.rows:
-        name = row.reading.specimen
-        shrinkage = shrinkages.get(comparison.names.get(name, ""), 0.0)
-        was, then, c_pf = before.get(name) or (None, None, {})
-        c = {one.frequency_hz: (one.c_pf, one.c_ratio) for one in measured.get(row.reading.number, ())}
-        state = row.reading.words.baked, row.reading.words.defects, row.reading.words.remark
-        if (state != _UNTOLD or shrinkage) and state != then:
-            listed.append(partial(_row, row, was, c_pf, c, shrinkage))
-            c_pf = {}
-        before[name] = row, state, c_pf | {f: pf for f, (pf, _) in c.items()}
+        words, ac_here = row.reading.words, measured.get(row.reading.number, ())
+        shrinkage = shrinkages.get(comparison.names.get(words.specimen, ""), 0.0)
+        was = before.get(words.specimen) or _of_prediction(row, ac_here)
+        c_pf = {one.frequency_hz: one.c_pf for one in ac_here}
+        state = words.baked, words.defects, words.remark
+        earlier = was.c_pf if was.state else {}
+        if (state != _UNTOLD or shrinkage) and state != was.state:
+            listed.append(partial(_row, row, was, c_pf, shrinkage))
+            earlier = {}
+        name = f"reading {row.reading.number}"
+        before[words.specimen] = _Before(name, row.verdict.ry_ohm, row.verdict.rz_ohm, earlier | c_pf, state)
     return Lazy(lambda k: listed[k](), range(len(listed)))
 
 
-def _row(row: Compared, was: Compared | None, pf: dict[float, float], c: _ByFrequency, shrinkage: float) -> HistoryRow:
-    """A reading beside the one before it, or beside its prediction where it is the first."""
+def _of_prediction(row: Compared, ac: Sequence[AcRow]) -> _Before:
+    expected = row.predicted.ry_ohm if row.predicted else None
+    c_pf = {one.frequency_hz: float(one.c_predicted_pf or nan) for one in ac}
+    return _Before("prediction", expected.value if expected else nan, nan, c_pf)
+
+
+def _row(row: Compared, was: _Before, c_pf: dict[float, float], shrinkage: float) -> HistoryRow:
     words, now = row.reading.words, row.verdict
-    if was is None:
-        expected = row.predicted.ry_ohm if row.predicted else None
-        against, baked = "prediction", False
-        before_ohm = expected.value if expected else nan, nan
-        ratios = {f: ratio for f, (_, ratio) in c.items()}
-    else:
-        against, baked = f"reading {was.reading.number}", was.reading.words.baked is False and bool(words.baked)
-        before_ohm = was.verdict.ry_ohm, was.verdict.rz_ohm
-        ratios = {f: value / pf[f] for f, (value, _) in c.items() if f in pf}
+    ratios = {f: pf / was.c_pf[f] for f, pf in c_pf.items() if f in was.c_pf}
     lowest, bake = min(ratios, default=None), "" if words.baked is None else BAKED[words.baked]
+    shrunk = shrinkage and ((was.state or _UNTOLD)[0], words.baked) == (False, True)
     return HistoryRow(
-        row.reading.number, row.reading.specimen, bake, 100 * shrinkage or None, words.defects, words.remark, against,
-        _ratio(now.ry_ohm, before_ohm[0]), _ratio(now.rz_ohm, before_ohm[1]), ratios.get(lowest or nan, nan),
-        at_text(lowest) if lowest else "", (1 - shrinkage) ** 2 if baked and shrinkage else None, now.word,
+        row.reading.number, row.reading.specimen, bake, 100 * shrinkage or None, words.defects, words.remark, was.name,
+        _ratio(now.ry_ohm, was.electrode_ohm), _ratio(now.rz_ohm, was.film_ohm), ratios.get(lowest or nan, nan),
+        at_text(lowest) if lowest else "", (1 - shrinkage) ** 2 if shrunk else None, now.word,
     )  # fmt: skip
 
 
