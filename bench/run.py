@@ -64,8 +64,8 @@ def row(what: str, got: float, target: float | None, note: str = "") -> dict[str
 PROBE = """
 import json, resource, sys, time
 import numpy, manifold3d
-from sensorgen.geometry import meshes
-from sensorgen.scene import Fill
+from sensorgen.scene.geometry import meshes
+from sensorgen.scene.scene import Fill
 import importlib
 shape, length, width = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
 module = importlib.import_module("sensorgen.design.shapes." + shape)
@@ -111,8 +111,8 @@ def meshing() -> tuple[list[dict[str, object]], dict[str, list[list[float]]]]:
 
 CHECK = """
 import sys, time
-from sensorgen import design
-from sensorgen.review import review
+from sensorgen.checks.review import review
+from sensorgen.design import design
 made = design.make({"shape": "tri", "parameters": {"length_mm": float(sys.argv[1])}})
 start = time.perf_counter()
 review(made)
