@@ -176,9 +176,8 @@ def test_what_dask_makes_of_cancelled_futures_is_one_line(monkeypatch, leaves):
 @pytest.mark.parametrize(
     ("address", "refused"),
     [
-        ("tcp://10.0.0.5:8786", True), ("10.0.0.5:8786", True), ("ws://cluster.example:80", True),
-        ("tcp://[2001:db8::1]:8786", True), ("tls://10.0.0.5:8786", False), ("tcp://127.0.0.1:9", False),
-        ("localhost:9", False), ("tcp://[::1]:9", False),
+        ("10.0.0.5:8786", True), ("ws://cluster.example:80", True), ("tcp://[2001:db8::1]:8786", True),
+        ("tls://10.0.0.5:8786", False), ("localhost:9", False), ("tcp://[::1]:9", False),
     ],
 )  # fmt: skip
 def test_a_cluster_on_a_network_needs_tls(address, refused, monkeypatch, tmp_path):

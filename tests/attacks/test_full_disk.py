@@ -5,7 +5,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
-from contextlib import closing
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
@@ -28,24 +28,39 @@ def path(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("unmerged", [False, True], ids=["checkpointed", "rows in the write-ahead log"])
-def test_a_full_disk_lets_read_and_says_what_is_not_logged(path, unmerged, forked, tmp_path):
-    if unmerged:  # as a killed program leaves it: the last row is in the write-ahead log alone
+@contextmanager
+def unmerged(path):
+    """A log whose last row is in the write-ahead log alone, as a killed program leaves it."""
+    with Log(path) as log, closing(sqlite3.connect(path)) as reader:
+        log._connection.execute("PRAGMA wal_autocheckpoint = 0")
+        reader.execute("BEGIN")
+        reader.execute("SELECT count(*) FROM record").fetchone()
+        log.add([reading(7)])
+        yield
+
+
+def mounted(place, script, *words):
+    """Outcome of a shell script in a name space of its own, whose first word is a folder to mount at."""
+    place.mkdir()
+    command = ["unshare", "-m", "sh", "-c", script, "sh", str(place), *map(str, words), sys.executable]
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
+    if "unshare" in done.stderr or "mount:" in done.stderr:
+        pytest.skip(done.stderr)
+    return done
+
+
+@pytest.mark.parametrize("killed", [False, True], ids=["checkpointed", "rows in the write-ahead log"])
+def test_a_full_disk_lets_read_and_says_what_is_not_logged(path, killed, forked, tmp_path):
+    if killed:
         copy = path.parent / "copy"
         copy.mkdir()
-        with Log(path) as log:
-            log._connection.execute("PRAGMA wal_autocheckpoint = 0")
-            reader = sqlite3.connect(path)
-            reader.execute("BEGIN")
-            reader.execute("SELECT count(*) FROM record").fetchone()
-            log.add([reading(7)])
+        with unmerged(path):
             for end in ("", "-wal"):
                 shutil.copy(f"{path}{end}", copy)
-            reader.close()
         path = copy / "log.db"
         with closing(sqlite3.connect(f"{path.as_uri()}?immutable=1", uri=True)) as without:
             assert without.execute("SELECT count(*) FROM record WHERE specimen = 'S7'").fetchone() == (0,)
-    expected = ["S0", "S1", "S2", *(["S7"] if unmerged else [])]
+    expected = ["S0", "S1", "S2", *(["S7"] if killed else [])]
     for command in COMMANDS:
         done = forked("log", command, "--log", path, cwd=tmp_path, FSIZE=0)
         assert (done.code, done.err) == (0, ""), done
@@ -64,12 +79,7 @@ def test_a_small_file_system_that_is_full(path):
         'mount -t tmpfs -o size=300k none "$1" && cp "$2" "$1/log.db" && { cat /dev/zero > "$1/fill" 2>/dev/null; '
         '"$3" -m sensorgen log list --log "$1/log.db" && "$3" -m sensorgen log verify --log "$1/log.db"; }'
     )
-    place = path.parent / "small"
-    place.mkdir()
-    words = ["unshare", "-m", "sh", "-c", script, "sh", str(place), str(path), sys.executable]
-    done = subprocess.run(words, capture_output=True, encoding="utf-8", check=False)
-    if "unshare" in done.stderr or "mount:" in done.stderr:
-        pytest.skip(done.stderr)
+    done = mounted(path.parent / "small", script, path)
     assert (done.returncode, done.stderr) == (0, "")
     assert "S2" in done.stdout
 
@@ -109,33 +119,16 @@ def test_a_medium_that_is_read_only_shows_rows_of_the_write_ahead_log_too(path):
         'mount -t tmpfs none "$1" && cp "$2" "$1/log.db" && cp "$2-wal" "$1/log.db-wal" && mount -o remount,ro "$1" && '
         '"$3" -m sensorgen log list --log "$1/log.db" && ! "$3" -m sensorgen log add "23 triX" --y 6 --log "$1/log.db"'
     )
-    place = path.parent / "medium"
-    place.mkdir()
-    with Log(path) as log:
-        reader = sqlite3.connect(path)
-        reader.execute("BEGIN")
-        reader.execute("SELECT count(*) FROM record").fetchone()
-        log.add([reading(7)])
-        done = subprocess.run(
-            ["unshare", "-m", "sh", "-c", script, "sh", str(place), str(path), sys.executable],
-            capture_output=True, encoding="utf-8", check=False,
-        )  # fmt: skip
-        reader.close()
-    if "unshare" in done.stderr or "mount:" in done.stderr:
-        pytest.skip(done.stderr)
+    with unmerged(path):
+        done = mounted(path.parent / "medium", script, path)
     assert done.returncode == 0, done
     assert "S7" in done.stdout
     assert "its disk is full or read-only; nothing was logged" in done.stderr
 
 
 def test_rows_of_a_log_that_is_gone_do_not_get_into_a_new_one(path):
-    with Log(path) as log:
-        reader = sqlite3.connect(path)
-        reader.execute("BEGIN")
-        reader.execute("SELECT count(*) FROM record").fetchone()
-        log.add([reading(7)])
+    with unmerged(path):
         shutil.copy(f"{path}-wal", path.parent / "kept")
-        reader.close()
     path.unlink()
     shutil.copy(path.parent / "kept", f"{path}-wal")
     with pytest.raises(Exception, match=r"log\.db-wal' is left of a log that was removed or renamed; move it"):

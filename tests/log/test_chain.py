@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log import Log, Prediction, Reading, chain, exchange, logbook, verify
+from sensorgen.measure.log import Log, Prediction, Reading, chain, database, exchange, verify
 from sensorgen.measure.log.exchange import thesis_readings
 from sensorgen.measure.log.logbook import withdraw
 from sensorgen.measure.log.notes import reading
@@ -112,7 +112,7 @@ def test_a_clock_that_was_set_back_is_told_and_decides_nothing(log, monkeypatch)
         def now(cls, tz=None):
             return datetime.now(tz) - timedelta(days=2500)
 
-    monkeypatch.setattr(logbook, "datetime", Back)
+    monkeypatch.setattr(database, "datetime", Back)
     (late,) = log.add([reading("23 triX", "650")])
     assert late.logged_at < first.logged_at
     assert log.before(first, [late]) is True

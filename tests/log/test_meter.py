@@ -21,7 +21,6 @@ FAILS = {
     "GPIB0::17::INSTR": r"reports '-350,\"Queue overflow\"'",
     "GPIB0::18::INSTR": "answers 'about 650'; expected a resistance",
     "GPIB0::19::INSTR": "answers '.6.5000'; expected a resistance",
-    "GPIB0::1::INSTR": "expected HP 34401A or Keithley 2000|no answer",
     "nonsense": "no answer from an instrument at 'nonsense'",
     "": "no answer from an instrument at ''",
 }

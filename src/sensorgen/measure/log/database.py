@@ -60,6 +60,8 @@ class Appender:
 
     Attributes
     ----------
+    now : str
+        Time of logging of all rows.
     sequence : int
         Number of the last record.
     head : str
@@ -68,6 +70,7 @@ class Appender:
 
     def __init__(self, connection: sqlite3.Connection, sequence: int = 0, head: str = "") -> None:
         self._connection = connection
+        self.now = datetime.now(UTC).isoformat(timespec="milliseconds")
         self.sequence, self.head = sequence, head
         self._numbers: dict[str, int] = {}
 
@@ -76,11 +79,12 @@ class Appender:
         """The last record, if there is one."""
         return [self.head] if self.head else []
 
-    def add(self, entry: Entry, now: str, heads: Sequence[str] = ()) -> int:
-        """Append the record of a row, behind the last one or behind several; its number among its kind."""
+    def add(self, entry: Entry, heads: Sequence[str] = ()) -> Entry:
+        """Append the record of a row, behind the last one or behind several; the row as logged."""
         kind, content = entries.NAMES[type(entry)], entries.content_of(entry)
-        record = chain.made(heads or self.heads, kind, entries.VERSIONS.get(kind, 1), now, entries.encoded(content))
-        return self.append(record, entries.index(content))
+        version, text = entries.VERSIONS.get(kind, 1), entries.encoded(content)
+        record = chain.made(heads or self.heads, kind, version, self.now, text)
+        return entry.numbered(self.append(record, entries.index(content)), self.now)
 
     def append(self, record: Record, index: Sequence[str | int | None], *, copy: bool = False) -> int:
         """Append a record with its entries of the index; a copy of a row that the log has gets no number of its own."""
@@ -122,14 +126,13 @@ def to_records(connection: sqlite3.Connection, version: int) -> None:
     present = {name for (name,) in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
     if not present.issuperset(_DROPPED):
         return
-    now = datetime.now(UTC).isoformat(timespec="milliseconds")
     writer = Appender(connection)
     rows = heapq.merge(*(_rows(connection, table) for table in _TABLES), key=lambda row: row[0])
     for logged_at, table, content in rows:
-        at = logged_at if _TIME.fullmatch(logged_at) else now
+        at = logged_at if _TIME.fullmatch(logged_at) else writer.now
         writer.append(chain.made(writer.heads, table, 1, at, content), entries.indexed(content))
     if writer.sequence:
-        writer.add(Migration(uid="", version=version, rows=writer.sequence), now)
+        writer.add(Migration(uid="", version=version, rows=writer.sequence))
     writer.finish()
     for table in _DROPPED:
         connection.execute(f"DROP TABLE {table}")

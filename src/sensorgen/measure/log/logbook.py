@@ -6,7 +6,6 @@ import uuid
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -343,13 +342,12 @@ class Log(AbstractContextManager["Log", None]):
 
         Parameters and errors as of :meth:`add`.
         """
-        now = datetime.now(UTC).isoformat(timespec="milliseconds")
         with database.transaction(self._connection, self.path):
             writer = Appender(self._connection, *self.head())
             self._printed.clear()
             self.passed_over.clear()
             for entry in entries:
-                if added := self._add(entry, now, writer):
+                if added := self._add(entry, writer):
                     yield added
             writer.finish()
 
@@ -363,14 +361,13 @@ class Log(AbstractContextManager["Log", None]):
             A record that is not what its identity says, or of a kind or schema that this version does not read; then
             nothing is added.
         """
-        now = datetime.now(UTC).isoformat(timespec="milliseconds")
         with database.transaction(self._connection, self.path):
             writer = Appender(self._connection, *self.head())
             merging = Merging(self, writer)
             yield merging
             if merging.added:
                 if len(merging.heads) > 1:
-                    writer.add(Merge(uid=""), now, list(merging.heads))
+                    writer.add(Merge(uid=""), list(merging.heads))
                 writer.finish()
 
     def sequence(self, key: str) -> int:
@@ -396,7 +393,7 @@ class Log(AbstractContextManager["Log", None]):
         sql = "SELECT 1 FROM record WHERE kind = ? AND uid = ? AND number IS NOT NULL"
         return bool(uid) and self._connection.execute(sql, [NAMES[kind], uid]).fetchone() is not None
 
-    def _add(self, entry: Entry, now: str, writer: Appender) -> Entry | None:
+    def _add(self, entry: Entry, writer: Appender) -> Entry | None:
         kind = type(entry)
         if self._exists(kind, entry.uid):
             known = next(self.entries(kind, superseded=True, uid=entry.uid))
@@ -411,7 +408,7 @@ class Log(AbstractContextManager["Log", None]):
             self._printed.clear()
         if entry.logged_at and not entry.claimed_at:
             entry = dataclasses.replace(entry, claimed_at=entry.logged_at)
-        return entry.numbered(writer.add(entry, now), now)
+        return writer.add(entry)
 
     def _check(self, entry: Entry) -> None:
         """Refuse a row that refers to none, corrects none, cannot be read later, or gives a name a second design."""
