@@ -9,11 +9,6 @@ from sensorgen.core.findings import Finding
 from sensorgen.design import shapes
 
 
-@pytest.mark.parametrize("name", registry.names(shapes))
-def test_what_is_listed_loads(name):
-    assert registry.load(shapes, name).__name__ == f"sensorgen.design.shapes.{name}"
-
-
 @pytest.mark.parametrize("name", ["__init__", "../errors", "tri.py", "", "os"])
 def test_what_is_not_listed_does_not_load(name):
     with pytest.raises(UnknownName, match="unknown shape"):
@@ -30,10 +25,7 @@ def test_what_is_not_listed_does_not_load(name):
 )
 def test_the_nearest_name_is_offered(given, said):
     assert str(UnknownName("shape", given, {"tri", "rect"})) == said
-
-
-def test_a_long_wrong_name_is_cut():
-    assert len(str(UnknownName("shape", "x" * 100_000, ["tri"]))) < 200
+    assert len(str(UnknownName("shape", given * 100_000, ["tri"]))) < 200
 
 
 def test_unprintable_names_its_first_finding_that_stands():

@@ -58,7 +58,6 @@ def test_wrong_words_are_told_in_one_line_and_nothing_is_logged(run, path, words
 
 def test_other_wrong_words(run, tmp_path):
     assert "unknown command of log 'lst'; did you mean 'list'" in run("lst").line
-    assert "no log at" in run("list").line
     assert "neither of FILE and --thesis" in run("import").line
     assert "both of FILE and --thesis" in run("import", "x", "--thesis").line
     assert "--column 'x': expected KEY=VALUE" in run("import", "x.csv", "--column", "x").line

@@ -213,7 +213,6 @@ def test_a_log_of_a_newer_sensorgen_is_refused(log, path):
     "statement",
     [
         "DROP TRIGGER record_no_delete",
-        "DROP INDEX record_supersedes",
         "CREATE TRIGGER evil AFTER INSERT ON record BEGIN SELECT 1; END",
         "DROP TABLE head",
     ],

@@ -13,8 +13,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache, lru_cache
-from itertools import compress
-from operator import eq, itemgetter, ne
+from operator import eq
 from types import NoneType
 from typing import Any, Self, TypeVar, cast, get_args, get_type_hints
 
@@ -422,12 +421,7 @@ _HELD: dict[type[Entry], dict[str, tuple[_Kinds, object]]] = {  # by a record: t
     kind: {f.name: (_kinds(of[f.name]), f.default) for f in fields(kind) if f.name not in UNHASHED}
     for kind, of in COLUMNS.items()
 }
-_PLAIN: dict[type[Entry], dict[str, type | None]] = {  # type that a field's value may have as it is
-    kind: {name: of if of in (str, int, bool) else None for name, ((_, of, _), _) in held.items()}
-    for kind, held in _HELD.items()
-}
 _USUAL = {kind: {name: usual for name, (_, usual) in held.items()} for kind, held in _HELD.items()}
-_FIELDS = {kind: itemgetter(*usual) for kind, usual in _USUAL.items()}
 _OPTIONAL = {kind: {f.name: f.default for f in fields(kind) if f.default is not MISSING} for kind in COLUMNS}
 _REQUIRED = {kind: {name for name, (_, usual) in held.items() if usual is MISSING} for kind, held in _HELD.items()}
 
@@ -440,9 +434,8 @@ def content_of(entry: Entry) -> dict[str, Any]:
     BadInput
         A value that the field cannot have.
     """
-    kind = type(entry)
-    row, usual = _FIELDS[kind](vars(entry)), _USUAL[kind]
-    data = dict(compress(zip(usual, row, strict=True), map(ne, row, usual.values())))
+    kind, row = type(entry), vars(entry)
+    data = {name: row[name] for name, usual in _USUAL[kind].items() if row[name] != usual}
     _values(kind, data)
     return data
 
@@ -497,11 +490,12 @@ def _object(content: str) -> dict[str, Any] | None:
 
 def _values(kind: type[Entry], data: Mapping[str, Any]) -> dict[str, Value]:
     """Values of a record's fields; BadInput where one cannot have its value."""
-    values, plain = dict(data), _PLAIN[kind]
+    values, held = dict(data), _HELD[kind]
     for name, value in data.items():
-        if type(value) is not plain[name]:
+        kinds = held[name][0]
+        if type(value) is not kinds[1] or kinds[1] in (float, list):
             try:
-                values[name] = _value(_HELD[kind][name][0], value)
+                values[name] = _value(kinds, value)
             except (TypeError, ValueError):
                 raise BadInput(f"column {name} of a {kind.__name__} holds {value!r:.60}") from None
     return values
