@@ -204,7 +204,7 @@ def test_lines_of_a_stream_are_those_of_a_file(limit, kind):
 def test_memory_does_not_grow_with_the_file(tmp_path):
     path = tmp_path / "long.csv"
     peaks = []
-    for rows in (8_000, 32_000):
+    for rows in (4_000, 16_000):
         with path.open("w") as file:
             file.write(HEAD)
             file.writelines([ROW] * rows)

@@ -4,7 +4,7 @@ import cmath
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput
@@ -124,6 +124,7 @@ def by_closed_forms(r, x, frequency_hz):
 
 
 @pytest.mark.parametrize("pair", sorted(immittance._PAIRS), ids=" ".join)
+@settings(max_examples=25)
 @given(st.floats(1e-2, 1e7), st.floats(1e-2, 1e7), st.sampled_from((1, -1)), st.floats(20, 1e6))
 def test_every_pair_gives_the_impedance_back(pair, r, size, sign, frequency_hz):
     x = -size if pair[0][0] == "C" else size if pair[0][0] == "L" else sign * size

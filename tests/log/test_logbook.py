@@ -185,13 +185,6 @@ def test_a_log_of_version_1_is_taken_along(version1):
     ]
 
 
-def test_a_log_is_the_same_new_or_taken_along(version1, tmp_path):
-    for path in (version1, tmp_path / "new.db"):
-        Log(path, create=True).__exit__(None, None, None)
-    objects = "SELECT type, name, sql FROM sqlite_schema ORDER BY name"
-    assert sql(version1, objects) == sql(tmp_path / "new.db", objects)
-
-
 def test_a_migration_that_fails_leaves_version_1(version1, monkeypatch):
     monkeypatch.setattr(database, "STEPS", (*database.STEPS[:2], (*database.STEPS[2], "CREATE TABLE reading (x)")))
     with pytest.raises(BadInput, match="damaged"):

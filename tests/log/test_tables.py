@@ -105,13 +105,6 @@ def test_columns_that_are_not_there(take):
         take("specimen,RY\n23 triX,1\n", yy="RY")
 
 
-def test_a_huge_table_is_refused_unread(log, tmp_path, monkeypatch):
-    with (tmp_path / "big.csv").open("wb") as file:
-        file.truncate(exchange.MOST_BYTES + 1)
-    with pytest.raises(SensorgenError, match="64000001 bytes; expected at most 64000000: split it"):
-        exchange.import_file(log, tmp_path / "big.csv", {})
-
-
 @pytest.mark.parametrize("place", ["none.csv", "/dev/zero", "none.json", "none.parquet", "a\0b"])
 def test_what_is_no_file(log, tmp_path, place):
     with pytest.raises(SensorgenError, match=r"cannot read|no file|no Parquet file"):
