@@ -36,11 +36,6 @@ def kernel(x86_64, aarch64, *given):
     return -ctypes.get_errno() if result == -1 else result
 
 
-def reached(*words):
-    """True if a system call was carried out: any answer but 'not permitted'."""
-    return kernel(*words) != -1
-
-
 def victim(name):
     return os.path.join(FOLDER, name).encode()
 
@@ -107,77 +102,6 @@ def imports_from_a_folder():
 
 
 @attack("files")
-def reads():
-    return opened(b"/etc/passwd") is not None
-
-
-@attack("files")
-def reads_by_openat2():
-    how = (ctypes.c_uint64 * 3)(0, 0, 0)
-    return kernel(437, 437, -100, b"/etc/passwd", how, 24) >= 0
-
-
-@attack("files")
-def reads_through_a_link():
-    return opened(victim("link")) is not None
-
-
-@attack("files")
-def own_memory():
-    return opened(b"/proc/self/mem", os.O_RDWR) is not None
-
-
-@attack("files")
-def root_of_the_process():
-    return opened(b"/proc/self/root/etc/passwd") is not None
-
-
-@attack("files")
-def descriptor_reopened():
-    return opened(b"/proc/self/fd/0") is not None
-
-
-@attack("files")
-def writes():
-    return opened(victim("written"), os.O_CREAT | os.O_WRONLY) is not None
-
-
-@attack("files")
-def truncates():
-    return kernel(76, 45, victim("truncated"), 0) == 0
-
-
-@attack("files")
-def deletes():
-    return kernel(263, 35, -100, victim("deleted"), 0) == 0
-
-
-@attack("files")
-def renames():
-    return kernel(316, 276, -100, victim("renamed"), -100, victim("renamed-2"), 0) == 0
-
-
-@attack("files")
-def links():
-    return kernel(265, 37, -100, victim("linked"), -100, victim("linked-2"), 0) == 0
-
-
-@attack("files")
-def symlinks():
-    return kernel(266, 36, b"/etc/passwd", -100, victim("symlinked")) == 0
-
-
-@attack("files")
-def makes_a_folder():
-    return kernel(258, 34, -100, victim("made"), 0o755) == 0
-
-
-@attack("files")
-def permits():
-    return kernel(268, 53, -100, victim("permitted"), 0o777) == 0
-
-
-@attack("files")
 def changes_the_time():
     os.utime(victim("timed"), (1, 1))
     return True
@@ -192,11 +116,6 @@ def looks():
 def changes_folder():
     os.chdir("/")
     return True
-
-
-@attack("files")
-def file_in_memory():
-    return kernel(319, 279, b"x", 0) >= 0
 
 
 @attack("files")
@@ -240,41 +159,11 @@ def starts_a_program():
 
 
 @attack("processes")
-def becomes_a_program():
-    return reached(59, 221, b"/nowhere", None, None)
-
-
-@attack("processes")
 def starts_a_thread():
     import _thread
 
     _thread.start_new_thread(int, ())
     return True
-
-
-@attack("processes")
-def signals_the_parent():
-    return kernel(62, 129, PARENT, 0) == 0
-
-
-@attack("processes")
-def signals_itself():
-    return reached(234, 131, os.getpid(), 0, 0)
-
-
-@attack("processes")
-def memory_of_the_parent():
-    return reached(310, 270, PARENT, None, 0, None, 0, 0)
-
-
-@attack("processes")
-def traces_the_parent():
-    return reached(101, 117, 0x4200, PARENT, 0, 0)
-
-
-@attack("processes")
-def limits_of_the_parent():
-    return kernel(302, 261, PARENT, 7, None, (ctypes.c_uint64 * 2)()) == 0
 
 
 # --- network
@@ -286,31 +175,6 @@ def connects():
 
     _socket.socket(2, 1).connect(("127.0.0.1", GIVEN["port"]))
     return True
-
-
-@attack("network")
-def socket_of_the_kernel():
-    return kernel(41, 198, 2, 1, 0) >= 0
-
-
-@attack("network")
-def sends_a_datagram():
-    return kernel(41, 198, 2, 2, 0) >= 0
-
-
-@attack("network")
-def unix_socket():
-    return kernel(41, 198, 1, 1, 0) >= 0
-
-
-@attack("network")
-def pair_of_sockets():
-    return kernel(53, 199, 1, 1, 0, (ctypes.c_int * 2)()) == 0
-
-
-@attack("network")
-def netlink():
-    return kernel(41, 198, 16, 3, 0) >= 0
 
 
 # --- the kernel
@@ -339,41 +203,6 @@ def other_numbers_of_calls():
     return kernel(0x40000000 + 1023, 1023) != -1
 
 
-@attack("kernel")
-def new_namespace():
-    return reached(272, 97, 0x04000000)
-
-
-@attack("kernel")
-def mounts():
-    return reached(165, 40, None, None, None, 0, None)
-
-
-@attack("kernel")
-def ring_of_calls():
-    return reached(425, 425, 0, None)
-
-
-@attack("kernel")
-def program_in_the_kernel():
-    return reached(321, 280, 99, None, 0)
-
-
-@attack("kernel")
-def keys():
-    return reached(250, 219, 99, 0)
-
-
-@attack("kernel")
-def becomes_another_user():
-    return kernel(105, 146, 0) == 0
-
-
-@attack("kernel")
-def filter_replaced():
-    return reached(317, 277, 1, 0, None)
-
-
 # --- time and memory
 
 
@@ -389,13 +218,55 @@ def memory_without_end():
 
 
 @attack("limits")
-def memory_limit_raised():
-    return kernel(302, 261, 0, 9, (ctypes.c_uint64 * 2)(2**63, 2**63), None) == 0
-
-
-@attack("limits")
 def large_file():
     return kernel(285, 47, 1, 0, 0, 1) not in (-1, -9)
+
+
+# --- system calls, by name: kind of the attack, numbers of the call on x86_64 and on aarch64, and what is given
+
+LIMITS = ctypes.c_uint64 * 2
+SUCCEED = {
+    "reads": ("files", 257, 56, -100, b"/etc/passwd", 0, 0o644),
+    "reads_by_openat2": ("files", 437, 437, -100, b"/etc/passwd", (ctypes.c_uint64 * 3)(0, 0, 0), 24),
+    "reads_through_a_link": ("files", 257, 56, -100, victim("link"), 0, 0o644),
+    "own_memory": ("files", 257, 56, -100, b"/proc/self/mem", os.O_RDWR, 0o644),
+    "root_of_the_process": ("files", 257, 56, -100, b"/proc/self/root/etc/passwd", 0, 0o644),
+    "descriptor_reopened": ("files", 257, 56, -100, b"/proc/self/fd/0", 0, 0o644),
+    "writes": ("files", 257, 56, -100, victim("written"), os.O_CREAT | os.O_WRONLY, 0o644),
+    "truncates": ("files", 76, 45, victim("truncated"), 0),
+    "deletes": ("files", 263, 35, -100, victim("deleted"), 0),
+    "renames": ("files", 316, 276, -100, victim("renamed"), -100, victim("renamed-2"), 0),
+    "links": ("files", 265, 37, -100, victim("linked"), -100, victim("linked-2"), 0),
+    "symlinks": ("files", 266, 36, b"/etc/passwd", -100, victim("symlinked")),
+    "makes_a_folder": ("files", 258, 34, -100, victim("made"), 0o755),
+    "permits": ("files", 268, 53, -100, victim("permitted"), 0o777),
+    "file_in_memory": ("files", 319, 279, b"x", 0),
+    "signals_the_parent": ("processes", 62, 129, PARENT, 0),
+    "limits_of_the_parent": ("processes", 302, 261, PARENT, 7, None, LIMITS()),
+    "socket_of_the_kernel": ("network", 41, 198, 2, 1, 0),
+    "sends_a_datagram": ("network", 41, 198, 2, 2, 0),
+    "unix_socket": ("network", 41, 198, 1, 1, 0),
+    "pair_of_sockets": ("network", 53, 199, 1, 1, 0, (ctypes.c_int * 2)()),
+    "netlink": ("network", 41, 198, 16, 3, 0),
+    "becomes_another_user": ("kernel", 105, 146, 0),
+    "memory_limit_raised": ("limits", 302, 261, 0, 9, LIMITS(2**63, 2**63), None),
+}
+ANSWERED = {  # by anything but 'not permitted'
+    "becomes_a_program": ("processes", 59, 221, b"/nowhere", None, None),
+    "signals_itself": ("processes", 234, 131, os.getpid(), 0, 0),
+    "memory_of_the_parent": ("processes", 310, 270, PARENT, None, 0, None, 0, 0),
+    "traces_the_parent": ("processes", 101, 117, 0x4200, PARENT, 0, 0),
+    "new_namespace": ("kernel", 272, 97, 0x04000000),
+    "mounts": ("kernel", 165, 40, None, None, None, 0, None),
+    "ring_of_calls": ("kernel", 425, 425, 0, None),
+    "program_in_the_kernel": ("kernel", 321, 280, 99, None, 0),
+    "keys": ("kernel", 250, 219, 99, 0),
+    "filter_replaced": ("kernel", 317, 277, 1, 0, None),
+}
+for name, (kind, *words) in SUCCEED.items():
+    ATTACKS[name] = kind, lambda words=words: kernel(*words) >= 0
+for name, (kind, *words) in ANSWERED.items():
+    ATTACKS[name] = kind, lambda words=words: kernel(*words) != -1
 
 
 def outcome(function):

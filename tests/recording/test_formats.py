@@ -253,15 +253,6 @@ def test_csv_with_stamps_only_is_rebuilt_from_them(tmp_path):
     np.testing.assert_allclose(found.clock.real_s(found.time_s) - made.EPOCH_S - 0.03, SHORT.time_s, atol=5e-3)
 
 
-def test_csv_with_a_time_that_steps_back_says_so(tmp_path):
-    times = [*range(50), 40, *range(50, 99)]
-    rows = [f"{t / 140:.6f},1.5,-2.5" for t in times]
-    (tmp_path / "t.csv").write_text("time_s,re_ohm_5.3kHz,im_ohm_5.3kHz\n" + "\n".join(rows) + "\n")
-    found = read(tmp_path / "t.csv")
-    assert (np.diff(found.time_s) > 0).all()
-    assert ["does not rise" in note for note in found.source.notes] == [True]
-
-
 def test_what_is_no_recording_says_what_is_missing(tmp_path):
     z, t = SHORT.impedance_ohm[BEFORE], SHORT.time_s[BEFORE]
     cases = [

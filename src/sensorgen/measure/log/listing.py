@@ -8,6 +8,7 @@ from math import isinf
 from typing import Any
 
 from sensorgen.core.document import Cell, Column, Facts, Part, Table
+from sensorgen.core.lazy import by_key
 from sensorgen.core.units import frequency_text, si
 from sensorgen.measure.immittance import shown_value
 from sensorgen.measure.log import bench
@@ -89,8 +90,7 @@ class Detail:
 
 
 def _title(row: Entry) -> str:
-    kind = {Reading: "reading", BenchRun: "recording"}.get(type(row), type(row).__name__.lower())
-    name = f"{kind} {row.number}: {getattr(row, 'specimen', '')}".rstrip()
+    name = f"{word(type(row))} {row.number}: {getattr(row, 'specimen', '')}".rstrip()
     return f"{name}, written {row.written!r}" if isinstance(row, Reading) and row.written != row.specimen else name
 
 
@@ -132,11 +132,11 @@ def _air(r: Reading) -> Iterator[str]:
 
 def _ac_lines(r: Reading) -> list[str]:
     """AC quantities of a reading, repeats side by side, as ``Cp 24.9 pF / 25.1 pF at 10kHz``."""
-    repeats: dict[tuple[str, float], list[str]] = {}
-    stated = r.uncertainty or (0.0,) * len(r.value)
-    for quantity, value, frequency, plus_minus in zip(r.quantity, r.value, r.frequency_hz, stated, strict=True):
-        text = shown_value(quantity, value) + (f" ± {shown_value(quantity, plus_minus)}" if plus_minus else "")
-        repeats.setdefault((quantity, frequency), []).append(text)
+    rows = zip(r.quantity, r.frequency_hz, r.value, r.uncertainty or (0.0,) * len(r.value), strict=True)
+    repeats = by_key(
+        ((name, f), shown_value(name, value) + (f" ± {shown_value(name, stated)}" if stated else ""))
+        for name, f, value, stated in rows
+    )
     return [f"{name} {' / '.join(values)} at {frequency_text(f)}" for (name, f), values in repeats.items()]
 
 
