@@ -119,7 +119,6 @@ def test_libraries_that_are_missing_are_named(results, monkeypatch):
     [
         ({"shape": "tri", "dielectric_mm": 0.2}, "dielectric_mm is a parameter; expected parameters: {dielectric_mm:"),
         ({"shape": "tri", "qualty": "fine"}, "unknown key 'qualty'; did you mean 'quality'"),
-        ({"shape": "trii"}, "did you mean 'tri'"),
         ({"shape": "tri", "quality": 3}, "quality is 3; expected text"),
     ],
 )
@@ -158,7 +157,7 @@ def test_lists_of_designs():
     "asked",
     [
         lambda: sg.check("tri"), lambda: sg.predict("tri"), lambda: sg.predict([]), lambda: sg.cell([]),
-        lambda: sg.sweep(PLATE, dielectric_mm=[]), lambda: sg.sweep(PLATE, dielectric_mm=0.2),
+        lambda: sg.sweep(PLATE, dielectric_mm=[]),
         lambda: sg.compress(PLATE, []), lambda: sg.compress(PLATE, [-1.0]), lambda: sg.predict(PLATE, force_n=[-5.0]),
         lambda: sg.predict(PLATE, force_n=[2.0, 1.0]), lambda: sg.predict(PLATE, noise=-1.0),
         lambda: sg.predict(PLATE, frequency_hz=0.0), lambda: sg.cell(PLATE, frequency_hz=-1.0),
@@ -194,12 +193,6 @@ def test_designs_of_any_kind_of_list():
     wanted = sg.cell(several).to_json()
     for kind in (np.array(several, dtype=object), iter(several), tuple(several)):
         assert sg.cell(kind).to_json() == wanted
-
-
-def test_both_electrodes_are_named_at_once():
-    assert sg.Design(shape="reference", materials={"electrode": "filaflex-conductive"}).materials.bottom_electrode == (
-        "filaflex-conductive"
-    )
 
 
 def test_a_reading_without_an_end_leaves_the_others_as_they_are():

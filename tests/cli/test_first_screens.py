@@ -55,12 +55,9 @@ def test_no_change_is_tried_unless_that_is_asked_for(run, monkeypatch):
     assert (run(*words, "--advise").code, tried) == (0, ["changes"])
 
 
-def test_an_output_of_build_is_a_folder_or_an_error(run):
+def test_an_output_of_build_is_a_folder(run):
     assert run("build", "reference", "--length", "10", "--no-cad", "-o", "made").code == 0
     assert len(list(Path("made").glob("*/check.json"))) == 1
-    Path("file").write_text("")
-    said = run("build", "reference", "--length", "10", "--no-cad", "-o", "file")
-    assert (said.code, Path("file").read_text()) == (2, "")
 
 
 def test_a_sweep_names_the_source_of_each_row_and_what_cannot_be_located():

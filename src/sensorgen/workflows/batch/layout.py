@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
 
+import numpy as np
+
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.printer import Printer, Quality, tower
 from sensorgen.scene.drawing.paper import box, element, fitted, text
@@ -133,8 +135,8 @@ def packed(sizes: Sequence[Size], room: Room) -> list[Plate]:
 
     Notes
     -----
-    Each goes to the place furthest to the front, then to the left, of the largest free rectangles (Jylanki's maximal
-    rectangles, bottom-left rule). Nothing is turned: lines and their resistance have a direction.
+    Each goes to the free place furthest to the front, then to the left. Nothing is turned: lines and their resistance
+    have a direction.
     """
     _refuse_giants(sizes, room, middle=False)
     given = range(len(sizes))
@@ -144,57 +146,37 @@ def packed(sizes: Sequence[Size], room: Room) -> list[Plate]:
 
 
 def _packed(sizes: Sequence[Size], order: Sequence[int], room: Room) -> list[Plate]:
-    plates: list[Plate] = []
-    frees: list[list[Rect]] = []
+    """Plates filled in an order; each specimen takes its gap along, to the right and the back."""
+    opened: list[tuple[Plate, list[Rect]]] = []
     for number in order:
-        length, width = (side + room.gap_mm for side in sizes[number])
-        first = next((k for k, free in enumerate(frees) if _corners(free, length, width)), len(plates))
-        if first == len(plates):
-            plates.append({})
-            frees.append(_all_free(room))
-        y, x = min(_corners(frees[first], length, width))
-        taken = Rect(x, y, x + length, y + width)
-        frees[first] = _without(frees[first], taken)
-        plates[first][number] = taken.longer(-room.gap_mm)
-    return plates
+        new: tuple[Plate, list[Rect]] = {}, []
+        plate, taken, place = next(
+            (plate, taken, place) for plate, taken in (*opened, new) if (place := _place(sizes[number], room, taken))
+        )
+        if not taken:
+            opened.append((plate, taken))
+        taken.append(place)
+        plate[number] = place.longer(-room.gap_mm)
+    return [plate for plate, _ in opened]
 
 
-def _all_free(room: Room) -> list[Rect]:
-    """The empty plate; each specimen takes its gap along, to the right and the back."""
-    free = [room.area.longer(room.gap_mm)]
-    for taken in room.tower:
-        free = _without(free, taken.longer(room.gap_mm))
-    return free
+def _place(size: Size, room: Room, taken: Sequence[Rect] = ()) -> Rect | None:
+    """The place furthest to the front, then to the left, with the gap behind and beside it; None where there is none.
 
-
-def _corners(free: Sequence[Rect], length: float, width: float) -> list[tuple[float, float]]:
-    """Front left corners, y before x, of the free rectangles in which there is room."""
-    least = length - _ROUNDING_MM, width - _ROUNDING_MM
-    return [(r.y0, r.x0) for r in free if r.size_mm[0] >= least[0] and r.size_mm[1] >= least[1]]
-
-
-def _without(free: Sequence[Rect], taken: Rect) -> list[Rect]:
-    """The largest free rectangles after a place is taken; those inside others are left out."""
-    pieces = sorted({p for r in free for p in _around(r, taken)}, key=lambda r: (r.y0, r.x0, r.y1, r.x1))
-    largest: list[Rect] = []
-    for piece in sorted(pieces, key=lambda r: -prod(r.size_mm)):
-        if not any(k.holds(piece) for k in largest):
-            largest.append(piece)
-    return largest
-
-
-def _around(r: Rect, taken: Rect) -> Iterator[Rect]:
-    if not r.meets(taken):
-        yield r
-        return
-    for part in (
-        Rect(r.x0, r.y0, taken.x0, r.y1),
-        Rect(taken.x1, r.y0, r.x1, r.y1),
-        Rect(r.x0, r.y0, r.x1, taken.y0),
-        Rect(r.x0, taken.y1, r.x1, r.y1),
-    ):
-        if min(part.size_mm) > _ROUNDING_MM:
-            yield part
+    It begins where the area does, or what is taken ends.
+    """
+    length, width = (side + room.gap_mm for side in size)
+    area, there = room.area.longer(room.gap_mm), [*(tower.longer(room.gap_mm) for tower in room.tower), *taken]
+    x0, y0, x1, y1 = np.array([[r.x0, r.y0, r.x1, r.y1] for r in there]).reshape(-1, 4).T
+    starts = np.unique([area.x0, *x1])
+    starts = starts[(starts >= area.x0) & (starts + length <= area.x1 + _ROUNDING_MM)]
+    for y in np.unique([area.y0, *y1]).tolist():
+        if area.y0 <= y <= area.y1 + _ROUNDING_MM - width:
+            row = (y0 + _ROUNDING_MM < y + width) & (y + _ROUNDING_MM < y1)
+            meets = (x0[row] + _ROUNDING_MM < starts[:, None] + length) & (starts[:, None] + _ROUNDING_MM < x1[row])
+            for x in starts[~meets.any(1)][:1].tolist():
+                return Rect(x, y, x + length, y + width)
+    return None
 
 
 def column(per_column: int) -> Layouts:
@@ -266,9 +248,8 @@ def _centred(plate: Plate, room: Room) -> Plate:
 
 def _refuse_giants(sizes: Sequence[Size], room: Room, *, middle: bool) -> None:
     """Refuse what fits on no plate, however empty, or not in its ``middle``."""
-    free = _all_free(room)
     for length, width in dict.fromkeys(sizes):
-        if not _corners(free, length + room.gap_mm, width + room.gap_mm):
+        if not _place((length, width), room):
             x, y = (max(side, 0.0) for side in room.area.size_mm)
             raise OutOfRange(
                 f"a specimen of {length:g} x {width:g} mm fits on no plate of this printer: {x:g} x {y:g} mm are free, "
