@@ -210,21 +210,20 @@ def test_stale_readings_at_rest_are_named(after, tmp_path):
     assert "take one before each press" in said.words
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["nobody"], "no design is known of 'nobody'"), (["S2"], "the log has no recording of S2"),
-        (["S1", "S1"], "stands twice"), (["S1", "--recheck"], "was never calibrated"),
-        (["S1", "S2", "--recheck"], "expected one"), (["S1", "--force-offset", "1"], "as 0.9+-0.1"),
-        (["S1", "--force-offset", "x+-1"], "not a force"), ([], "SPECIMEN"),
-        (["S1", "--recording", "4"], "no recording 4 of S1; expected one of its own: 1"),
-    ],
-)  # fmt: skip
-def test_what_is_missing_is_one_line(bench, words, said):
+MISSING = {
+    "nobody": "no design is known of 'nobody'", "S2": "the log has no recording of S2", "S1 S1": "stands twice",
+    "S1 --recheck": "was never calibrated", "S1 S2 --recheck": "expected one", "S1 --force-offset 1": "as 0.9+-0.1",
+    "S1 --force-offset x+-1": "not a force", "": "SPECIMEN", "S1 S2 --source s1.yaml": "--source of 2 specimens",
+    "S1 --recording 4": "no recording 4 of S1; expected one of its own: 1",
+}  # fmt: skip
+
+
+def test_what_is_missing_is_one_line(bench):
     assert bench("log", "specimen", "S2", "--design", "mine.yaml").code == 0
-    found = bench("calibrate", *words)
-    assert found.code == 2
-    assert said in found.line
+    for words, said in MISSING.items():
+        found = bench("calibrate", *words.split())
+        assert found.code == 2
+        assert said in found.line
 
 
 def meter(truth, frequency_hz):
@@ -307,13 +306,12 @@ def test_readings_that_no_specimen_has_are_named(bench):
     assert "fit no specimen of this design" in found.words
 
 
-def test_values_of_materials_are_told_and_become_a_source(bench, alone, tmp_path):
-    said = said_by_calibrate(tmp_path)
+def test_values_of_materials_are_told_and_become_a_source(made, alone):
+    said = said_by_calibrate(made)
     assert "material values of this specimen, 95 %" in said
     assert "x60: " not in said
-    text = (tmp_path / "calibrated" / "s1.yaml").read_text("utf-8")
+    text = (made / "calibrated" / "s1.yaml").read_text("utf-8")
     assert "resistivity_ohm_m: {value: " in text
     found = alone["materials"]
     assert [one["quantity"] for one in found] == ["resistivity_ohm_m", "relative_permittivity", "youngs_modulus_pa"]
     assert all(one["lower"] < one["value"] < one["upper"] for one in found)
-    assert bench("calibrate", "S1", "S2", "--source", "s1.yaml").code == 2

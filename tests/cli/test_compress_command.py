@@ -5,7 +5,6 @@ import io
 import json
 import re
 import sys
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -186,22 +185,9 @@ def test_laws_of_a_plate(run):
     tied = sandwich.modulus_pa(3e6, 0.01, 6e-4, 5e9, electrode_pa=(22e6, 22e6), electrode_m=(3e-4, 3e-4))
     assert moved["bonded"] == pytest.approx([0.0, 600 * 1e5 / tied], rel=1e-3)
     for law in moved:
-        assert "applies to a solid plate, tri is none" in run("compress", "tri", "--model", law).line
+        assert "applies to a solid plate, tri is none" in run("compress", "tri", "--drawn", "--model", law).line
     soft = run(*PLATE, "--model", "unconfined", "--set", "youngs_modulus_x60=5e4")
     assert "100 kPa on x60 of 50 kPa" in soft.line
-
-
-@needs_mesher
-def test_what_is_not_to_be_trusted_is_said_with_exit_code_1(run, monkeypatch):
-    solved = press2d.press
-
-    def stalled(*args, **more):
-        return replace(solved(*args, **more), faults=("converged up to 5 of 100 kPa",))
-
-    monkeypatch.setattr(press2d, "press", stalled)
-    found = run("compress", "reference", "--sides", "symmetric", "--stress", "5")
-    assert found.code == 1
-    assert "not to be trusted: converged up to 5 of 100 kPa" in found.line
 
 
 PLATE_1 = ("compress", "reference", "--sides", "symmetric", "--stress", "100", "--accuracy")
@@ -227,13 +213,6 @@ def test_a_plan_and_what_came_of_it(run):
     assert max(error) == pytest.approx(found["largest_rise_error"])
     assert max(error) <= 1e-2
     assert "an estimate" in found["bounds"]
-
-
-@needs_mesher
-def test_an_accuracy_below_what_is_possible_says_the_best(run):
-    said = run(*PLATE_1, "1e-12")
-    assert said.code == 1
-    assert "accuracy 1e-12 not reached: " in said.line
 
 
 @needs_mesher
@@ -299,6 +278,12 @@ def test_a_sweep_solves_only_what_is_not_known(run, asked, monkeypatch):
     assert handed == [2, 1, 2]
 
 
+def test_what_is_not_to_be_trusted_is_said_with_exit_code_1(run, asked):
+    found = run(*PLATE[:-1], "--set", "youngs_modulus_x60=9e6")
+    assert (found.code, asked) == (1, [9e6])
+    assert "not to be trusted: faces run into each other" in found.line
+
+
 def test_a_sweep_as_csv_and_table(run, asked):
     rows = list(csv.DictReader(io.StringIO(run(*MODULI, "--csv").out)))
     assert [row["youngs_modulus_x60"] for row in rows] == ["10000.0", *["3000000.0"] * 3, *["6000000.0"] * 3]
@@ -340,20 +325,6 @@ def test_bounds_that_cross_stop_a_sweep_and_what_was_solved_is_known(run, asked)
     assert (said.code, said.out, "lower bound above" in said.line) == (2, "", True)
     run(*MODULI, "--sweep", "youngs_modulus_x60=6e6,9e6")
     assert asked == [6e6, 8e6, 9e6]
-
-
-@needs_mesher
-def test_a_sweep_in_processes_is_what_each_point_is_alone(run, asked, monkeypatch):
-    """The stub is of this process alone, which solves nothing."""
-    monkeypatch.setattr("os.cpu_count", lambda: 2)
-    words = ("compress", "reference", "--sides", "symmetric", "--stress", "100", "--json")
-    rows = json.loads(run(*words, "--sweep", "eps_x60=2.34,4.68").out)
-    lower = [row["lower_f_per_m2"][0] * 4e-6 for row in rows]
-    assert lower == pytest.approx([0.27625066e-12 / 2, 0.27625066e-12], rel=1e-6, abs=0)
-    for row in rows:
-        alone = json.loads(run(*words, "--set", f"eps_x60={row['eps_x60']}").out)
-        assert alone == {key: row[key] for key in alone}
-    assert asked == []
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,7 @@ def found(**changes):
 def test_the_front_is_that_of_a_plain_loop():
     """Every plate evaluated by itself, each pair of them compared."""
     values = {}
-    for film in (0.1, 0.2, 0.3):
+    for film in (0.1, 0.2):
         for electrode in (0.2, 0.3):
             plate = make({"shape": "reference", "parameters": {"dielectric_mm": film, "electrode_mm": electrode}})
             p = evaluate(bodies.estimated(plate), keep=False, beside=False)
@@ -62,11 +62,11 @@ def test_the_front_is_that_of_a_plain_loop():
         k for k, (c, r) in values.items()
         if not any(c2 >= c and r2 >= r and (c2 > c * (1 + 1e-9) or r2 > r * (1 + 1e-9)) for c2, r2 in values.values())
     }  # fmt: skip
-    search_ = found(parameters={"dielectric_mm": {"from": 0.1, "to": 0.3}, "electrode_mm": {"from": 0.2, "to": 0.3}})
+    search_ = found(parameters={"dielectric_mm": {"from": 0.1, "to": 0.2}, "electrode_mm": {"from": 0.2, "to": 0.3}})
     leads = {tuple(row.values.values()) for row in result.leads(search_)}
     assert leads == best == {(0.1, 0.2)}
-    assert len(search_.rows) == 6
-    assert len(search_.evaluated) + sum(bool(row.discarded) for row in search_.rows) == 6
+    assert len(search_.rows) == 4
+    assert len(search_.evaluated) + sum(bool(row.discarded) for row in search_.rows) == 4
 
 
 @pytest.mark.usefixtures("at_rest")
@@ -113,9 +113,10 @@ def test_sensitivity_on_the_coarse_mesh_is_that_of_a_bonded_plate():
 
 @pytest.mark.usefixtures("at_rest")
 def test_limits_are_proven_before_anything_is_evaluated():
-    search_ = found(limits={"capacitance_pf": {"most": 150}})
+    films = {"dielectric_mm": {"from": 0.1, "to": 0.4}}
+    search_ = found(parameters=films, limits={"capacitance_pf": {"most": 150}})
     assert {row.values["dielectric_mm"] for row in search_.evaluated} <= {0.3, 0.4}
-    assert Reason("limit capacitance_pf", True, 6) in search_.reasons()
+    assert Reason("limit capacitance_pf", True, 2) in search_.reasons()
 
 
 def test_a_target_that_nothing_meets_names_the_nearest_and_what_binds():
@@ -163,14 +164,19 @@ def test_a_search_that_is_stopped_goes_on_where_it_was(monkeypatch):
     assert len(tried) == len(set(tried)) + 1 == len(search_.evaluated) + 1  # the one that was stopped
 
 
-def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch):
+def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch, plate):
     """A coarse mesh that is wrong by more than the margin is seen, and what it discarded is evaluated."""
 
-    def lying(design, query, solve):
+    def lying(design, *_):
         film = design.params.dielectric_mm
         return {"force_resolution_n": EarlyNumber(film if film != 0.4 else 9.0, film if film != 0.4 else 9.0, False)}
 
+    def everything(design, *_):
+        printed = replace(plate[1].printed, force_resolution=Bounds.of(30 * design.params.dielectric_mm, "N"))
+        return replace(plate[1], printed=printed, doubts=(), findings=())
+
     monkeypatch.setattr(ladder, "known", lying)
+    monkeypatch.setattr(ladder, "everything", everything)
     search_ = found(objectives={"force_resolution_n": "minimise"})
     assert search_.largest > 1.5
     assert search_.margin > search_.largest
@@ -366,7 +372,7 @@ def planted_space(monkeypatch, plate, off):
             for k, film in enumerate(films)], best  # fmt: skip
 
 
-@pytest.mark.parametrize("off", [1.0, 1.08, 1 / 1.4])
+@pytest.mark.parametrize("off", [1.0, 1 / 1.4])
 def test_a_margin_that_narrows_finds_the_same_designs(monkeypatch, plate, off):
     """Those of a plain loop, by fewer evaluations; what one coarse mesh shows that is worse than others widens it."""
     evaluated = []
@@ -432,7 +438,7 @@ def test_a_huge_space_is_refused_with_its_size():
 
 
 @pytest.mark.usefixtures("at_rest")
-@pytest.mark.parametrize("counts", [(6, 4), pytest.param((72, 48), marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("counts", [(4, 3), pytest.param((72, 48), marks=pytest.mark.nightly)])
 def test_a_sample_of_a_huge_space_proves_nothing(counts):
     """Millions of plates; of those that were tried the one with the best C is the best, by the plate capacitor."""
     pytest.importorskip("optuna")
