@@ -36,23 +36,6 @@ def test_a_plan_as_json_file_and_picture(run, tmp_path):
     assert run(*words, "-o", str(table)).out == f"{table}: 10 presses, 1 min 26 s\n"
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--force", "6"), "expected the least and the largest"),
-        (("--tip", "101"), "longer than the sensor, 100 mm"),
-        (("--dwell", "0"), "expected a dwell above 0"),
-        (("--seed", "-1"), "--seed -1; expected"),
-        (("--picture", "plan.jpg"), "ends in .png"),
-        (("--presses", "60000", "--repeats", "1"), "expected up to 100000"),
-    ],
-)
-def test_what_cannot_be_planned_is_refused(run, words, said):
-    found = run("bench", "plan", "reference", *words)
-    assert found.code == 2
-    assert said in found.err
-
-
 MADE = made.presses(12, seed=3, dwell_s=3, rest_s=3)
 
 

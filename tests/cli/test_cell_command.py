@@ -215,35 +215,6 @@ def stat(pid):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--accuracy", "0"], "--accuracy: 0; expected a number above 0"),
-        (["--accuracy", "nan"], "--accuracy: nan; expected a number above 0"),
-        (["--model", "fem4d"], "unknown model of capacitance 'fem4d'; did you mean 'fem"),
-        (["--drawn", "--model", "fem3d"], "fem3d: not all of it is boxes"),
-        (["--drawn", "--dielectric", "0"], "the electrodes touch: the capacitance grows without bound"),
-        (["--set", "eps_x61=3"], "unknown material 'x61'; did you mean 'x60'"),
-        (["--set", "epz_x60=3"], "unknown quantity of x60 'epz'; did you mean 'eps'"),
-        (["--set", "eps_x60=soft"], "material_values.x60.relative_permittivity is 'soft'; expected a number"),
-        (["--set", "eps_x60=-1"], "relative_permittivity of x60 is -1; expected 1e-09 to 1e+09"),
-        (["--explain", "--json"], "--json holds the plan too"),
-        (["--sweep", "eps_x60"], "--sweep 'eps_x60': expected KEY=VALUE"),
-        (["--sweep", "eps_x60=1:a:2"], "'a' is not a number: write a number without a unit"),
-        (["--sweep", "eps_x60=0,1"], "eps_x60=0.0: relative_permittivity of x60 is 0"),
-        (["--sweep", "dielectric_mm=0.2:0.1:0.05"], "expected a step above 0"),
-        (["--sweep", "dielectric_mm=99"], "dielectric_mm=99.0: dielectric_mm is 99; expected"),
-        (["--sweep", "nosuch=1,2"], "unknown setting 'nosuch'"),
-        (["--sweep", "along=x,z"], "along=z: unknown value of along 'z'"),
-        (["--jobs", "0"], "--jobs"),
-    ],
-)
-def test_wrong_words(run, words, said):
-    got = run("cell", "tri", *words)
-    assert (got.code, got.out) == (2, "")
-    assert said in got.line
-
-
-@pytest.mark.parametrize(
     ("word", "quantity", "value"),
     [
         ("eps_x60=3.0", "relative_permittivity", 3.0),

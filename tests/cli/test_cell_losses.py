@@ -58,20 +58,3 @@ def test_a_loss_may_be_swept_from_0(run):
                   for row in csv.DictReader(io.StringIO(said.out)))  # fmt: skip
     assert none["loss_lower"] <= 0 <= none["loss_upper"] < 1e-5 * none["lower"]
     assert some["loss_lower"] / some["lower"] == pytest.approx(0.02, rel=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--set", "resistivity_x60=1e6"), "--frequency 1.1kHz"),
-        (("--set", "loss_x60=-0.1"), "expected 0 to 1e+06"),
-        (("--set", "loss_x60=1e7"), "expected 0 to 1e+06"),
-        (("--set", "loss_x60=0.1", "--model", "columns"), "losses are solved by fem2d and fem3d alone"),
-        (("--set", "loss_x60=0.1", "--frequency", "1kHz,2kHz"), "expected one"),
-        (("--set", "loss_x60=0.1", "--frequency", "0"), "above 0"),
-    ],
-)
-def test_what_means_nothing_is_refused(run, words, said):
-    found = run("cell", "tri", *words)
-    assert found.code == 2
-    assert said in found.err

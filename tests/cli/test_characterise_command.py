@@ -361,27 +361,6 @@ def test_a_wrong_form_is_refused_in_one_line(planned, run, tmp_path, old, new, w
     assert not (tmp_path / "materials").exists()
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["diabase-h5", "etpu"], "expected one that conducts and one that does not"),
-        (["diabase-h5", "etpu", "x60", "bvoh"], "expected one that conducts and one that does not"),
-        (["diabase-h5", "etpu", "x61"], "unknown material 'x61'; did you mean 'x60'"),
-        (["diabase", "etpu", "x60"], "unknown printer 'diabase'"),
-        (["diabase-h5", "etpu", "x60", "--hours", "0.01"], "no coupon fits"),
-        (["diabase-h5", "etpu", "x60", "--count", "13"], "expected 2 to 12 coupons"),
-        (["diabase-h5", "etpu", "x60", "--tool", "etpu"], "expected MATERIAL=NUMBER"),
-        (["--hours", "3"], "stands before the printer"),
-        (["read", "no.yaml"], "cannot read"),
-    ],
-)
-def test_a_wrong_command_is_refused_in_one_line(run, tmp_path, words, message):
-    said = run("characterise", *words)
-    assert said.code == 2
-    assert message in said.line
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_source_with_an_interval_is_as_uncertain_as_that(tmp_path):
     (tmp_path / "materials").mkdir()
     (tmp_path / "materials" / "lab-1.yaml").write_text(

@@ -83,32 +83,6 @@ def test_a_shape_that_a_model_cannot_speak_of_is_refused(run):
     assert "must be solved in 3D" in run("compress", "rect", "--drawn", "--model", "press2d").line
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--stress", "-1"], "expected 0 or more"),
-        (["--stress", "0"], "expected a stress above 0"),
-        (["--stress", "much"], "is not a stress"),
-        (["--stress", "5mm"], "is not a stress"),
-        (["--sides", "glued"], "bonded"),
-        (["--contact", "slippy"], "frictionless"),
-        (["--model", "press4d"], "press2d"),
-        (["--set", "nu_x60=0.6"], "0.5"),
-        (["--set", "youngs_modulus_x60=0"], "youngs_modulus"),
-        (["--model", "springs", "--stress", "9000MPa"], "flat"),
-        (["--set", "youngs_modulus_x60=5e4"], "100 kPa on x60 of 50 kPa"),
-        (["--explain"], "--explain without --accuracy"),
-        (["--accuracy", "1e-2", "--explain", "--json"], "--json holds the plan too"),
-        (["--accuracy", "1e-2", "--check-mesh"], "at once"),
-        (["--accuracy", "1e-2", "--model", "springs"], "springs tells displacement alone, no capacitance; leave out"),
-    ],
-)
-def test_wrong_words_end_with_2_and_one_line(run, words, said):
-    found = run("compress", "tri", *words)
-    assert found.code == 2
-    assert said in found.line
-
-
 @pytest.mark.parametrize("model", [pytest.param("press2d", marks=pytest.mark.nightly), "springs"])
 def test_values_that_no_source_gives_are_told_with_their_ranges(run, model):
     """BVOH has none: its modulus is that of any filament, up to that of rigid plastics."""
@@ -325,20 +299,6 @@ def test_bounds_that_cross_stop_a_sweep_and_what_was_solved_is_known(run, asked)
     assert (said.code, said.out, "lower bound above" in said.line) == (2, "", True)
     run(*MODULI, "--sweep", "youngs_modulus_x60=6e6,9e6")
     assert asked == [6e6, 8e6, 9e6]
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--accuracy", "1e-2", "--explain"], "one design; --json holds the plan too"),
-        (["--plot", "a.png"], "--plot draws one design"),
-        (["--sweep", "dielectric_mm=99"], "dielectric_mm=99.0: dielectric_mm is 99"),
-    ],
-)
-def test_a_sweep_that_makes_no_sense(run, words, said):
-    found = run("compress", "tri", "--sweep", "dielectric_mm=0.1,0.2", *words)
-    assert (found.code, found.out) == (2, "")
-    assert said in found.line
 
 
 @pytest.mark.parametrize(

@@ -97,6 +97,11 @@ def test_axes_that_are_not_named(run):
     assert len(rows_of(run(*FREE, "--csv", "--frequencies", "1").out)) == 61 * 101
 
 
+def test_a_comma_stands_between_two_positions(run):
+    """One mm and five mm, not one and a half."""
+    assert "2 positions 1 to 5 mm" in run(*FREE, "--position", "1,5").out
+
+
 def test_without_a_load(run):
     said = run(*FREE)
     least, most = 1 + 3.68 / math.exp(0.196), 6.33  # permittivity, of 4.68 in 69.06 pF; leads and the edge beyond
@@ -194,48 +199,6 @@ def test_pictures_are_put_in_their_folder(run, tmp_path, monkeypatch, shared_cac
     assert {p.name: p.read_text() for p in (tmp_path / "a/b").iterdir()} == {name: name for name in plots.STEPS}
     assert said.out.splitlines() == [f"a/b/{name}" for name in plots.STEPS]
     assert [p.name for p in tmp_path.iterdir() if p.name not in ("a", "log.db")] == []
-
-
-WRONG = [
-    (["--noise", "300%"], "--noise 3; expected a share above 0 and below 1"),
-    (["--accuracy", "-1"], "--accuracy: -1; expected a number above 0"),
-    (["--tip=-1"], "tip.width_mm is -1.0; expected a number above 0"),
-    (["--compression", "solved"], "--compression and --sides at once"),
-    (["--force", "0:6:0"], "--force: '0:6:0': expected a step above 0"),
-    (["--force", "2,1"], "--force: '2,1': 1 stands after 2; expected rising values, each once"),
-    (["--force", "-1"], "--force: -1; expected 0 or more"),
-    (["--force", "6 kg"], "--force: '6 kg' is not a force: write a number, with N, mN, kN"),
-    (["--position", "0:120:40"], "position 120 mm is outside the sensor; expected 0 to 100 mm"),
-    (["--position", "1,5"], None),
-    (["--position=-5"], "--position: -5; expected 0 or more"),
-    (["--frequencies", "0,1kHz"], "--frequencies: 0; expected above 0"),
-    (["--frequencies", "1mhz"], "'mhz' may be mHz or MHz"),
-    (["--frequencies", "1kHz,1kHz"], "1000 stands twice"),
-    (["--force", "0:700:100", "--position", "50"], "force 600 N at position 50 mm: the stress thins the film by 1: "),
-    (["--plot", "p", "--force", "0:700:100"], "force 600 N at position 5 mm: the stress thins the film by 1: "),
-    (["--force", "1", "--tip", "120"], "a tip of 120 mm; expected up to the sensor's 100 mm"),
-    (["--force", "1", "--tip", "0"], "tip.width_mm is 0.0; expected a number above 0"),
-    (["--tip", "5,stiff,even"], "--tip: '5,stiff,even': expected as 10mm, 5mm,stiff, even or 10mm,ninjaflex,10mm"),
-    (["--tip", "rubber"], "unknown material 'rubber'"),
-    (["--force", "1", "--compression", "bond"], "unknown --compression 'bond'; did you mean 'bonded'?"),
-    (["--force", "1", "--json", "--csv"], "--json and --csv at once; expected one of them"),
-    (["--plot", "p", "--csv"], "--csv and --plot at once"),
-    (["--plot", "p", "-o", "f"], "--output and --plot at once"),
-    (["--plot", "p", "--force", "1"], "1 force(s) and 101 position(s) make no map"),
-    (["--force", "0:6:0.001", "--position", "0:100:0.1"], "7 x 6001 x 1001 frequencies, forces and positions;"),
-    (["--force", "1", "-o", "."], "cannot write '.': it is a folder or a device; expected a file"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("words", "message"), WRONG, ids=[" ".join(words) for words, _ in WRONG])
-def test_wrong_words(run, tmp_path, words, message):
-    said = run(*FREE, *words)
-    if message is None:  # one mm and five mm, not one and a half
-        assert "2 positions 1 to 5 mm" in said.out
-        return
-    assert (said.code, said.out) == (2, "")
-    assert message in said.line
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_picture_where_a_file_is(run, tmp_path, monkeypatch, shared_cache):

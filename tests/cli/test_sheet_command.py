@@ -92,33 +92,6 @@ def test_maps_are_drawn(run, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "say"),
-    [
-        (["--contacts", "corner-pads"], "did you mean 'corners'"),
-        (["--force", "1,2"], "--force: 2 values; expected one"),
-        (["--force", "0"], "above 0"),
-        (["--tip", "60"], "leaves no place"),
-        (["--tip", "0"], "--tip: 0; expected above 0"),
-        (["--noise", "0"], "--noise 0; expected a share above 0"),
-        (["--frequencies", "1GHz,900GHz"], "use frequencies up to"),
-        (["--frequencies", f"{10**140}"], "below 1e+100, not 1e+140"),
-        (["--pad", "0-10"], "expected X0-X1,Y0-Y1 in mm"),
-        (["--pad", "0-10,0-10-20"], "expected X0-X1,Y0-Y1 in mm"),
-        (["--pad", "0-ten,0-10"], "--pad: '0-ten,0-10': 'ten' is not a length"),
-        (["--pad=-5-10,0-10"], "expected X0-X1,Y0-Y1"),
-        (["--pad", "10-0,0-10"], "give the lower first"),
-        (["--pad", "0,0"], "without length"),
-        (["--pad", "55-65,0-10"], "x 55..65, y 0..10 mm reaches from x = 55 to 65 mm, beyond the sheet's 0 to 60 mm"),
-        (["--pad", "0-10,0-10", "--pad", "5-15,0-10"], "shorted"),
-    ],
-)
-def test_wrong_words_are_one_line(run, words, say):
-    said = run(*WORDS, *words)
-    assert said.code == 2
-    assert say in said.line
-
-
-@pytest.mark.parametrize(
     ("length_m", "words"),
     [
         (0.99951, "1 m"), (8949.0, "8.95 km"), (999_999.0, "1 Mm"), (3e9, "∞"), (float("inf"), "∞"),

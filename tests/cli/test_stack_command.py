@@ -46,21 +46,3 @@ def test_its_json_is_plain(run):
     assert (found["force_n"], found["position_m"]) == (3.0, pytest.approx(0.045))
     assert [row["frequency_hz"] for row in found["readings_ohm"]][-1] == 99.7e3
     assert {row["wiring"] for row in found["touch"]} == {"top driven", "top at ground", "bridge, either way round"}
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--position", "99"], "overhangs"),
-        (["--force", "1,2"], "expected one"),
-        (["--force", "0"], "--force"),
-        (["--drift", "0"], "--drift 0; expected a share"),
-        (["--touch", "200"], "a tip of 200 mm; expected up to"),
-        (["--force", "9kN"], "touch"),
-        (["--upper-dielectric", "0"], "touch"),
-    ],
-)
-def test_wrong_words_end_with_2_and_one_line(run, words, said):
-    found = run("stack", "double", *words)
-    assert found.code == 2
-    assert said in found.line
