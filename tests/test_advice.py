@@ -10,7 +10,6 @@ from sensorgen.checks.review import review
 from sensorgen.core import yamlfile
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import BadInput
-from sensorgen.core.findings import Finding, grouped
 from sensorgen.design import best
 from sensorgen.design.design import load, make
 from sensorgen.prediction.results import resolved
@@ -114,15 +113,8 @@ def test_a_change_that_senses_nothing_is_not_advice(plate, monkeypatch):
     assert "no change was found" in next(iter(advice.document()))
 
 
-@pytest.mark.parametrize(("error", "words"), [
-    (None, "–"),
-    (Bounds.of(8580.0, "m"), "cannot locate"),
-    (Bounds.of(0.03, "m"), "cannot locate"),  # more than 100 mm / sqrt(12)
-    (Bounds.of(0.02, "m"), "20 mm"),
-    (Bounds(0.02, 0.001, 41.0, "m", *(None,) * 3), "20 mm (1 to >100)"),
-])  # fmt: skip
-def test_extremes_are_words(error, words):
-    assert resolved(error, 0.1, "cannot locate") == words
+def test_a_range_ends_at_the_sensor():
+    assert resolved(Bounds(0.02, 0.001, 41.0, "m", *(None,) * 3), 0.1, "cannot locate") == "20 mm (1 to >100)"
 
 
 def test_a_change_that_is_not_needed_is_dropped(plate):
@@ -139,14 +131,6 @@ def test_a_prediction_that_would_outrun_the_budget_is_not_begun(plate):
     design, made, _ = plate
     assert not advise(design, made, 1e9, spent_s=0.6e9).predicted
     assert advise(design, made, 1e9, spent_s=0.4e9).predicted
-
-
-def test_seven_layers_of_one_sentence_are_one_finding():
-    alike = [Finding("5-width", "warning", b, f"{w} mm wide", "widen it", w, 0.44, layer, (1, 2, 3), 50)
-             for b, w, layer in (("a", 0.3, 5), ("b", 0.1, 6), ("a", 0.2, 9))]  # fmt: skip
-    (one,) = grouped([*alike])
-    assert (one.message, one.count, one.layer, one.last_layer, one.body) == ("0.1 mm wide", 150, 5, 9, "a, b")
-    assert len(grouped([*alike, Finding("5-width", "error", "a", "0.3 mm wide", "widen it")])) == 2
 
 
 @pytest.mark.parametrize(("text", "values", "after"), [
