@@ -127,7 +127,7 @@ def test_from_another_folder(run, unpressed):
     """What is beside the design is not beside the working folder."""
     put(Path("sub"), "material", "eel"), put(Path("sub"), "shape", "zig"), put(Path("sub"), "printer", "mine")
     Path("sub/my.yaml").write_text(DESIGN, encoding="utf-8")
-    for words in (["check"], ["predict", "--drawn"], ["build", "--no-cad"], ["draw", "-o", "d.svg"]):
+    for words in (["check"], ["predict", "--drawn"], ["draw", "-o", "d.svg"]):
         said = run(words[0], "sub/my.yaml", *words[1:])
         assert (said.code, "sensorgen: " in said.err) == (0, False), words
 
@@ -416,7 +416,6 @@ PLANTED = [
     ("material", "value: 5.0, source: it-sheet, default: true", "value: 5.0, source: it-sheet",
      "default: relative_permittivity has no default value"),
     ("material", "value: 0.1,", "value: -0.1,", "read: .*resistivity_ohm_m of it-sheet is -0.1"),
-    ("shape", "box(*whole, low, film)", "box(*whole, low, film + 0.01)", "scene: .*overlap by"),
     ("shape", '"bottom"),', '""),', "terminals: terminals are"),
     ("shape", "min(x + 3 * quarter, end)", "min(x + 3 * quarter, end) - 0.1", "support: .*are left empty"),
     ("shape", "from math import ceil", "from math import ceil\n\ntry:\n    import numpy\nexcept ImportError:\n    pass",
@@ -429,15 +428,10 @@ PLANTED = [
     ("material", "low: 0.05, high: 0.5", "low: 0.5, high: 0.05",
      "read: it.yaml, line 12: resistivity_ohm_m of it-sheet has low 0.5 above high 0.05"),
     ("material", "{value: 0.1,", "{value: 0.9,", "line 12: .* is 0.9, outside its own range of 0.05 to 0.5"),
-    ("material", "value: 220.0", "value: 2200.0", "line 23: nozzle_temperature_c of .* is 2200; expected 20 to 600"),
     ("material", "20.0e6", "20.0", r"line 16: youngs_modulus_pa of it-sheet is 20; .*1 MPa is 1.0e6 Pa.*implausible"),
-    ("material", "20.0e6", "6.0e12", r"line 16: youngs_modulus_pa of it-sheet is 6e\+12; expected 100 to 2e\+12"),
-    ("material", "value: 5.0,", "value: 0.5,", "line 14: relative_permittivity of it-sheet is 0.5; expected 1 to"),
     ("shape", "    low = p.electrode_mm", "    import random\n    low = p.electrode_mm * random.uniform(0.9, 1)",
      "random: the same parameters give different bodies"),
     ("shape", "    low = p.electrode_mm", "    low = p.electrode_mm * (1 + hash('a') % 10**9 / 1e10)",
-     "random: the same parameters"),
-    ("shape", "    low = p.electrode_mm", "    import time\n    low = p.electrode_mm + time.time_ns() % 10**9 / 1e10",
      "random: the same parameters"),
     ("quality", "layer_mm: 0.15  ", "layer_mm: 0.9  ", "profile: no printer that ships can print it"),
 ]  # fmt: skip

@@ -18,6 +18,12 @@ REFUSED = {  # by the words that they follow
         (["check", "reference", "--budget", "nan"], "nan is not a number"),
         (["log", "add", "S1", "--humidity", "nan"], "nan is not a number"),
     ],
+    "predict": [
+        (["tri", "--drawn", "--force", "1", "--compression", "bonded"],
+         "the law 'bonded' applies to a solid plate; tri has gaps: expected 'unconfined'"),
+        (["reference", "--drawn", "--force", "1", "--compression", "solved"],
+         "is a solid plate: expected the law 'unconfined', 'bonded' or 'symmetric'"),
+    ],
     "check tri": [
         (["--along", "xx"], "unknown --along 'xx'; did you mean 'x'? Known: x, y"),
         (["--orientation", "upsidedown"], "did you mean 'upside-down'?"),
