@@ -15,12 +15,9 @@ DEEP = "[" * 100_000
 BOMB = "a: &a [x, x]\n" + "".join(f"{b}: &{b} [{','.join([f'*{a}'] * 9)}]\n" for a, b in pairwise("abcdefghi"))
 FILES = {
     "tag": ("shape: !!python/object/apply:os.system ['touch pwned']", "line 1: tags (!name) are not taken"),
-    "bad timestamp": ("shape: tri\nname: !!timestamp nonsense", "line 2: tags (!name) are not taken"),
     "billion laughs": (BOMB, "line 2: aliases (*name) are not taken"),
     "deep": (DEEP, "nested deeper than 20 levels"),
-    "deep mappings": ("{a: " * 5_000, "nested deeper than 20 levels"),
     "key twice": ("shape: tri\nshape: rect", "line 2, column 1: key 'shape' is given twice"),
-    "key twice inside": ("shape: tri\nparameters: {period_mm: 1, period_mm: 2}", "key 'period_mm' is given twice"),
     "unhashable key": ("shape: tri\n? [a, b]\n: 1", "line 2, column 3: key that is a list or a mapping: expected text"),
     "number as key": ("shape: tri\nparameters: {1: 2}", "key '1': expected text"),
     "merge key": ("shape: tri\n<<: {quality: extrafine}", "unknown key '<<'"),
@@ -28,37 +25,24 @@ FILES = {
     "two documents": ("shape: tri\n---\nshape: rect", "expected a single document"),
     "open quote": ("shape: 'tri", "line 1"),
     "empty": ("", "holds nothing; expected a mapping of names to values"),
-    "comment": ("# nothing yet\n", "holds nothing"),
     "list at top": ("- tri", "holds a list; expected a mapping"),
-    "word at top": ("tri", "holds text; expected a mapping"),
     "huge code point": ('shape: "\\UFFFFFFFF"', "bad.yaml: "),
     "half a code point": ('shape: "\\ud800"', "bad.yaml: "),
     "NUL": ("shape: tri\0", "control character #x0000 at position 10"),
     "no shape": ("quality: fine", "shape is missing; expected bump, cog, cone, double"),
     "empty shape": ("shape:", "shape is None; expected text"),
-    "list as shape": ("shape: [tri]", "shape is ['tri']; expected text"),
-    "unknown shape": ("shape: trj", "unknown shape 'trj'; did you mean 'tri'?"),
     "unknown key": ("shape: tri\nmaterial: {}", "unknown key 'material'; did you mean 'materials'?"),
-    "unknown parameter": ("shape: tri\nparameters: {perod_mm: 2}", "unknown parameter of tri 'perod_mm'; did"),
     "true": ("shape: tri\nparameters: {period_mm: true}", "parameters.period_mm is True; expected a number"),
-    "yes": ("shape: tri\nparameters: {period_mm: yes}", "period_mm is 'yes'; expected a number"),
-    "octal": ("shape: tri\nparameters: {period_mm: 010}", "period_mm is '010'; expected a number"),
-    "sexagesimal": ("shape: tri\nparameters: {period_mm: 1:30}", "period_mm is '1:30'; expected a number"),
-    "date": ("shape: tri\nparameters: {period_mm: 2024-01-01}", "period_mm is '2024-01-01'; expected a number"),
     "huge number": ("shape: tri\nparameters: {period_mm: 1" + "0" * 400 + "}", "period_mm is inf; expected"),
-    "larger number": ("shape: tri\ntools: {x60: 1" + "0" * 5_000 + "}", "tools.x60 is inf; expected a whole number"),
     "infinity": ("shape: tri\nparameters: {period_mm: .inf}", "period_mm is inf; expected a number from 0.1"),
     "not a number": ("shape: tri\nparameters: {period_mm: .nan}", "period_mm is nan; expected a number from 0.1"),
     "nothing": ("shape: tri\nparameters: {period_mm: }", "parameters.period_mm is None; expected a number"),
     "list of parameters": ("shape: tri\nparameters: [1]", "parameters is [1]; expected a mapping of names to values"),
     "word for materials": ("shape: tri\nmaterials: x60", "materials is 'x60'; expected a mapping with top_electrode"),
     "waiver without reason": ("shape: tri\nwaivers: [{rule: 5-width}]", "waivers.0.reason is missing"),
-    "waiver with excuse": ("shape: tri\nwaivers: [{rule: 5-width, reason: eh}]", "reason is 'eh'; expected at least 5"),
     "waiver of no rule": ("shape: tri\nwaivers: [{rule: width, reason: because}]", "expected text such as 5-width"),
     "unsafe name": ("shape: tri\nname: ../../x", "name: '../../x' cannot be a file name everywhere"),
-    "no name": ("shape: tri\nname:", "name is None; expected text"),
     "empty name": ("shape: tri\nname: ''", "name: '' cannot be a file name"),
-    "number as name": ("shape: tri\nname: 23", "name is 23; expected text"),
     "one source each": ("shape: tri\nmaterials: {film: x60@thesis-4.1, dielectric: x60@thesis-3.2}", "name one source"),
 }  # fmt: skip
 
@@ -163,7 +147,7 @@ def test_bom_and_windows_line_ends_and_umlauts_in_comments_are_fine(run, tmp_pat
     assert (said.code, said.err) == (0, "")
 
 
-@pytest.mark.parametrize("stem", ["mein größter sensor", "it's", "-x", "CON"])
+@pytest.mark.parametrize("stem", ["mein größter sensor", "CON"])
 def test_a_file_whose_name_is_no_name_for_results(run, tmp_path, stem):
     path = tmp_path / f"{stem}.yaml"
     path.write_text("shape: reference")
