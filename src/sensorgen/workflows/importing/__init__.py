@@ -22,6 +22,7 @@ from sensorgen.core.lazy import by_key
 from sensorgen.design import design as designs
 from sensorgen.design import imported, packs
 from sensorgen.prediction.bodies import drawn as drawn_body
+from sensorgen.scene.connections import groups
 from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import Piece
 from sensorgen.workflows.importing.reading import Assembly, ReadBody, shared_mm
@@ -167,13 +168,14 @@ def _terminals(
 
 def _touching(bodies: Sequence[ReadBody]) -> list[list[str]]:
     """Names of bodies in groups of those that touch."""
-    solids, boxes = {body.name: body.solid() for body in bodies}, {body.name: body.box_mm for body in bodies}
-    groups = {body.name: frozenset([body.name]) for body in bodies}
-    for a, b in combinations(groups, 2):
-        if (shared_mm(boxes[a], boxes[b]) > -_CONTACT_MM).all() and solids[a].min_gap(solids[b], 1.0) < _CONTACT_MM:
-            joined = groups[a] | groups[b]
-            groups |= dict.fromkeys(joined, joined)
-    return [[name for name in groups if groups[name] == own] for own in dict.fromkeys(groups.values())]
+    solids = [body.solid() for body in bodies]
+    pairs = [
+        (a, b) for a, b in combinations(range(len(bodies)), 2)
+        if (shared_mm(bodies[a].box_mm, bodies[b].box_mm) > -_CONTACT_MM).all()
+        and solids[a].min_gap(solids[b], 1.0) < _CONTACT_MM
+    ]  # fmt: skip
+    labels = groups(len(bodies), *np.array(pairs, np.int64).reshape(-1, 2).T).tolist()
+    return list(by_key(zip(labels, (body.name for body in bodies), strict=True)).values())
 
 
 def _by_height(
