@@ -55,7 +55,7 @@ def run(path):
     force_part, position_part = (found.force_n, 1, force), (found.position_m * 1e3, 1e3, position * 1e3)
     for k, (ax, (got, scale, true)) in enumerate(zip(axes, (force_part, position_part), strict=True)):
         for status, colour in COLOURS.items():
-            counts = status.force_counts if k == 0 else status.position_counts
+            counts = status <= (Status.FORCE_ONLY, Status.AT_THE_END)[k]
             rows = np.flatnonzero((found.status == status) & counts)
             ax.errorbar(
                 place[rows], got[rows], error[rows, k] * scale, fmt=".", ms=4, lw=0.7, color=colour, alpha=0.8,

@@ -174,9 +174,7 @@ def test_readings_below_their_rest_put_their_neighbours_in_doubt(model, specimen
     assert (found.verdict == Verdict.LOADED_REST).sum() == 19
 
 
-@pytest.mark.parametrize(
-    ("load_n", "zeros", "is_shown"), [(0.0, 0, False), (0.0, 60, False), (1.0, 0, True), (1.0, 60, True)]
-)
+@pytest.mark.parametrize(("load_n", "zeros", "is_shown"), [(0.0, 60, False), (1.0, 0, True)])
 def test_readings_below_their_rest_show_a_load_at_rest(load_n, zeros, is_shown):
     """Forces up to 6 N, each read to 0.6 N, and readings of no force, which alone show no load."""
     rng, per_n = np.random.default_rng(3), 1.7
@@ -224,7 +222,7 @@ def test_presses_near_an_end_may_lie_in_the_interval(model, specimens):
     assert force > 0.87  # by each reading alone 0.8: the tip hangs over the end, where half of it presses twice as hard
 
 
-@pytest.mark.parametrize(("places_m", "is_wider"), [(None, False), ((0.029, 0.031), False), ((0.09, 0.1), True)])
+@pytest.mark.parametrize(("places_m", "is_wider"), [((0.029, 0.031), False), ((0.09, 0.1), True)])
 def test_a_session_near_an_end_alone_widens_the_interval_of_the_force(model, specimens, places_m, is_wider):
     """Readings that each tell the place to 70 mm do so together; presses all over or in the middle are as before."""
     strip, _, posterior = specimens[1]
@@ -285,16 +283,15 @@ def test_without_presses_the_interval_has_the_range_of_the_print():
     assert np.mean(held) >= 0.85
 
 
-@pytest.mark.parametrize("ohm", [1e5, 1e4])
-def test_a_hole_is_calibrated_and_named(model, ohm):
-    known = data_of(run(replace(drawn_at_random(2), hole_ohm=ohm), 24, 2), NOISE)
+def test_a_hole_is_calibrated_and_named(model):
+    known = data_of(run(replace(drawn_at_random(2), hole_ohm=1e5), 24, 2), NOISE)
     posterior = calibrated(model, known)
     made = records.Calibration("S1", "mine", "0" * 16, model, posterior, 6.0, None, ("a",))
     assert any(note.startswith("leak: ") and "has left what was expected" in note for note in made.departures())
     assert np.isfinite(posterior.covariance).all()
 
 
-@pytest.mark.parametrize(("value", "is_told"), [(3.34e6, True), (9.9e6, True), (3.7e6, False), (9.7e6, False)])
+@pytest.mark.parametrize(("value", "is_told"), [(3.34e6, True), (9.9e6, True), (3.7e6, False)])
 def test_a_material_whose_median_was_not_expected_is_named(model, specimens, monkeypatch, value, is_told):
     """Also where its interval still reaches into what was expected."""
     modulus = MaterialEstimate("x60", "youngs_modulus_pa", value, 0.8 * value, 1.2 * value, 3.68e6, 9.79e6, "presses")
@@ -305,10 +302,10 @@ def test_a_material_whose_median_was_not_expected_is_named(model, specimens, mon
 
 @pytest.mark.parametrize(
     ("answer", "jump", "tones", "noise"),
-    [(1, 0.05, 1, 0.05), pytest.param(1, 0.3, 7, 0.01, marks=pytest.mark.nightly), (0, 0.0, 1, 1.0)],
+    [(1, 0.05, 1, 0.05), (0, 0.0, 1, 1.0)],
 )
 def test_readings_that_no_specimen_gives_are_no_singular_matrix(model, answer, jump, tones, noise):
-    """Rests that jump by 5 or 30 %, of little noise; no answer to the force at all."""
+    """Rests that jump by 5 %, of little noise; no answer to the force at all."""
     known = data_of(run(replace(drawn_at_random(2), hole_ohm=1e4), 24, 2), NOISE)
     ratio = answer * known.ratio + jump * np.random.default_rng(1).standard_normal((24, tones))
     posterior = calibrated(model, replace(known, ratio=ratio, noise=noise * known.noise))

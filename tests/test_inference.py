@@ -96,15 +96,6 @@ def test_evidence_of_a_linear_model_is_the_density_of_its_data():
     assert at[0] + fit.step()[0] == pytest.approx(prior.at + gain @ (data - slope @ prior.at), rel=1e-9)
 
 
-def test_fits_of_two_parts_of_the_data_add_up():
-    rng = np.random.default_rng(4)
-    at, residual, slope = rng.normal(size=(2, 3)), rng.normal(size=(2, 8)), rng.normal(size=(2, 3, 8))
-    whole = LocalFit.of(at, residual, slope)
-    both = LocalFit.of(at, residual[:, :5], slope[..., :5]) + LocalFit.of(at, residual[:, 5:], slope[..., 5:])
-    for name in ("at", "chi2", "information", "gradient"):
-        assert getattr(both, name) == pytest.approx(getattr(whole, name))
-
-
 def test_readings_beyond_a_prior_are_what_was_read():
     """Of a parameter and of combinations: the information and the estimate of the readings alone."""
     prior, rng = normal(5), np.random.default_rng(5)

@@ -22,8 +22,8 @@ from sensorgen.models import line
 from sensorgen.prediction import quantities
 from sensorgen.prediction.bodies import drawn, estimated
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.loaded import LARGEST, ROWS, ImpedanceGrid, Loaded, csv_blocks, grid, positions_mm
-from sensorgen.prediction.query import NOISE, TONES_HZ, Query
+from sensorgen.prediction.loaded import LARGEST, ROWS, ImpedanceGrid, Loaded, csv_blocks, grid
+from sensorgen.prediction.query import NOISE, Query
 from sensorgen.prediction.rest_state import Lost, rest_state
 from sensorgen.prediction.results import from_json, to_json
 from sensorgen.prediction.sensor_model import sensor_model
@@ -60,12 +60,11 @@ def test_it_names_every_value_and_its_source():
     }
 
 
-@pytest.mark.parametrize(("source", "eps"), [("thesis-4.1", 4.79), ("thesis-c.1", 6.33), ("thesis-4.2.3", 5.0)])
-def test_the_source_that_a_design_names_is_taken(source, eps):
-    slots = dict.fromkeys(("film", "dielectric"), f"x60@{source}")
+def test_the_source_that_a_design_names_is_taken():
+    slots = dict.fromkeys(("film", "dielectric"), "x60@thesis-c.1")
     found = prediction(make({"shape": "reference", "materials": slots}))
-    assert values(found)["x60", "relative_permittivity", source] == eps
-    assert found.capacitance.model.lower == close(PLATE_F * eps / 4.68, 1e-12)
+    assert values(found)["x60", "relative_permittivity", "thesis-c.1"] == 6.33
+    assert found.capacitance.model.lower == close(PLATE_F * 6.33 / 4.68, 1e-12)
 
 
 @pytest.mark.parametrize("end", ["top", "bottom"])
@@ -95,17 +94,15 @@ def test_a_value_that_no_source_gives_is_a_range_that_is_named():
     assert not replace(found, values=()).conditional
 
 
-@pytest.mark.parametrize("shape", ["tri", "rect", "reference"])
-def test_a_short_has_a_reason_in_place_of_numbers(shape):
-    found = prediction(make({"shape": shape, "parameters": {"dielectric_mm": 0.0}}))
+def test_a_short_has_a_reason_in_place_of_numbers():
+    found = prediction(make({"shape": "rect", "parameters": {"dielectric_mm": 0.0}}))
     assert (found.capacitance, found.status, found.gap.value) == (None, "short", 0.0)
     assert "the electrodes touch" in found.reason
 
 
-@pytest.mark.parametrize(("shape", "support"), [("tri", "pla"), ("rect", "bvoh")])
-def test_support_is_dissolved_before_use(shape, support):
+def test_support_is_dissolved_before_use():
     """So it counts as air, and its own permittivity is never asked for."""
-    bare, filled = (prediction(make({"shape": shape, "materials": m})) for m in ({}, {"support": support}))
+    bare, filled = (prediction(make({"shape": "tri", "materials": m})) for m in ({}, {"support": "pla"}))
     assert content(filled) == content(bare)
 
 
@@ -116,9 +113,7 @@ def test_how_it_is_printed_does_not_change_what_it_is(change):
 
 
 # Models-line.md: 41.5 kHz at 1.2 S/m. Errata (2.24): 256 kHz with Table C.1's resistivities, 0.07 + 0.2 ohm m.
-@pytest.mark.parametrize(
-    ("slots", "corner_khz"), [(TABLE_3_2, 41.5), (TABLE_C_1, 256.0), ({}, 256.0 * 0.27 / (2 * 0.042))]
-)
+@pytest.mark.parametrize(("slots", "corner_khz"), [(TABLE_3_2, 41.5), (TABLE_C_1, 256.0)])
 def test_corner_frequencies_of_the_plate(slots, corner_khz):
     corner = prediction(make({"shape": "reference", "materials": slots})).corner_frequency
     assert corner.value / 1e3 == pytest.approx(corner_khz, rel=2e-3)
@@ -137,24 +132,16 @@ def test_capacitances_of_the_thesis_sensors():
         assert bounds.lower <= bounds.model.lower < bounds.upper
 
 
-@pytest.mark.parametrize("asked", [{}, {"frequency_hz": (1e3, 1e6)}])
-def test_impedance_at_the_tones_is_coth(asked):
-    found = prediction(make({"shape": "reference"}), **asked)
-    assert [row.frequency_hz for row in found.impedance] == list(asked.get("frequency_hz", TONES_HZ))
+def test_impedance_at_the_tones_is_coth():
+    tones = (1e3, 1e6)
+    found = prediction(make({"shape": "reference"}), frequency_hz=tones)
+    assert tuple(row.frequency_hz for row in found.impedance) == tones
     resistance = 2 * 0.042 / 3e-5
     for row in found.impedance:
         y = 2j * math.pi * row.frequency_hz * PLATE_F
         z = cmath.sqrt(resistance / y) / cmath.tanh(cmath.sqrt(resistance * y))
         assert row.re.value == close(z.real, 1e-9)
         assert row.im.value == close(z.imag, 1e-11)
-
-
-def test_the_ranges_of_the_impedance_hold_its_middle():
-    for row in prediction(make({"shape": "tri"}), body=estimated).impedance:
-        for part in (row.re, row.im):
-            assert part.lower < part.value < part.upper
-            for alone in (part.model, part.print, part.material):
-                assert part.lower <= alone.lower <= part.value <= alone.upper <= part.upper
 
 
 def test_the_range_of_a_response_has_the_ways_to_print_at_its_ends(monkeypatch, shared_cache):
@@ -249,14 +236,6 @@ def test_at_the_ends_the_tip_overhangs_and_presses_on_what_is_left(plate):
         assert (value.real, value.imag) == (close(alone.real, 1e-12), close(alone.imag, 1e-12))
 
 
-def test_positions_span_the_sensor_and_end_on_it():
-    for length in (100.0, 33.0, 177.8, 12.3):
-        found = positions_mm(make({"shape": "reference", "parameters": {"length_mm": length}}))
-        assert len(found) == 101
-        assert (found[0], found[50], found[-1]) == (0.0, pytest.approx(length / 2), length)
-        assert list(found) == sorted(set(found))
-
-
 @pytest.mark.parametrize(
     ("forces", "at_mm", "said"),
     [
@@ -302,7 +281,7 @@ def test_moves_are_counted_in_deviations_of_a_reading():
     assert NOISE == 1e-3
 
 
-@pytest.mark.parametrize("count", [ROWS - 1, ROWS, ROWS + 1])
+@pytest.mark.parametrize("count", [ROWS, ROWS + 1])
 def test_csv_loses_no_row_between_blocks(plate, count):
     at = np.linspace(5, 95, count)
     _, *blocks = csv_blocks(plate[1].sensor, [1e3], [1.0, 2.0], at)

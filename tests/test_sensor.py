@@ -8,16 +8,10 @@ import pytest
 from line_cases import PLATE as LINE_PLATE
 from line_cases import TONES, exact
 
+from card_sensors import PLATE, TRI
 from sensorgen.core.errors import OutOfRange
-from sensorgen.core.units import EPS0_F_PER_M
-from sensorgen.models import compression, line
-from sensorgen.models.sensor import Sensor
+from sensorgen.models import line
 
-PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), EPS0_F_PER_M * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
-SQUARES = {
-    "dielectric_mm": 0.1, "period_mm": 2.0, "hang_height_mm": 0.5, "lower_height_mm": 0.24,
-}  # fmt: skip
-TRI = replace(PLATE, compression=compression.solved("tri", SQUARES, {"x60": 6e6, "etpu": 22e6}))
 TONE = np.array(TONES)
 
 
@@ -27,7 +21,7 @@ def plate_inputs(force, position, hertz=99.7e3):
     return LINE_PLATE | {"force_n": force, "left_m": left, "tip_m": right - left, "frequency_hz": hertz}
 
 
-@pytest.mark.parametrize("position", [0.0, 0.002, 0.05, 0.0976, 0.1])
+@pytest.mark.parametrize("position", [0.0, 0.05, 0.0976])
 def test_the_plate_is_the_lines_own(position):
     expected = line.impedance(line.PressedLine(**plate_inputs(3.0, position, TONE)))
     found = PLATE.impedance(TONE, 3.0, position)
@@ -35,8 +29,7 @@ def test_the_plate_is_the_lines_own(position):
     assert found.imag == pytest.approx(expected.imag, rel=1e-13)
 
 
-@pytest.mark.parametrize("force", [-2.0, 0.0, 0.5, 6.0])
-@pytest.mark.parametrize("position", [0.002, 0.05, 0.0976])
+@pytest.mark.parametrize(("force", "position"), [(-2.0, 0.05), (0.0, 0.002), (6.0, 0.0976)])
 def test_slopes_against_mpmath(force, position):
     """Also where the tip overhangs, and the patch's length moves with it."""
     found = PLATE.response(99.7e3, force, position)
@@ -48,7 +41,7 @@ def test_slopes_against_mpmath(force, position):
 
 
 @pytest.mark.parametrize("piezo", [(0.0, 0.0), (2e-6, -1e-6)])
-@pytest.mark.parametrize(("force", "position"), [(0.3, 0.05), (2.0, 0.003), (6.0, 0.0453), (3.0, 0.098), (11.0, 0.004)])
+@pytest.mark.parametrize(("force", "position"), [(0.3, 0.05), (11.0, 0.004)])
 def test_slopes_on_a_curve_against_differences(piezo, force, position):
     """By Richardson's rule from two steps, its own error some 1e-9."""
     sensor = replace(TRI, piezoresistance_per_pa=piezo)
@@ -74,12 +67,6 @@ def test_without_force_nothing_tells_of_position_on_a_curve_either():
     assert found.by_force_ohm_per_n.all()
 
 
-def test_resistance_capacitance_and_corner_of_the_plate():
-    assert PLATE.resistance_ohm() == pytest.approx(9000.0, rel=1e-12)
-    assert PLATE.capacitance_f() == pytest.approx(69.06266e-12, rel=1e-6, abs=0)
-    assert PLATE.corner_frequency_hz() == pytest.approx(256e3, rel=1e-3)
-
-
 def test_stress_is_force_over_what_rests_on_the_sensor():
     """6 N on 10 x 10 mm are 60 kPa; at the end half of the tip overhangs."""
     assert PLATE.stress_pa(6.0, np.array([0.05, 0.0, 0.1])) == pytest.approx([6e4, 1.2e5, 1.2e5])
@@ -89,10 +76,8 @@ def test_stress_is_force_over_what_rests_on_the_sensor():
     ("change", "position", "said"),
     [
         ({}, -1e-6, "position -0.001 mm is outside the sensor; expected 0 to 100 mm"),
-        ({}, np.array([0.05, 0.11]), "position 110 mm"),
-        ({}, float("nan"), "position nan mm"),
+        ({}, np.array([0.05, np.nan]), "position nan mm"),
         ({"tip_m": 0.11}, 0.05, "tip of 110 mm"),
-        ({"tip_m": 0.0}, 0.05, "tip of 0 mm"),
     ],
 )
 def test_presses_beside_the_sensor_are_refused(change, position, said):

@@ -12,7 +12,7 @@ from sensorgen.analysis.plots import static
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.array_frames import of_frames, read
-from sensorgen.measure.virtual.array import foot, nodal, printed, simulated, step, walked
+from sensorgen.measure.virtual.array import foot, nodal, printed, simulated, walked
 from sensorgen.prediction.array import frames as frames_module
 from sensorgen.prediction.array.frames import PressureMaps, inverted
 from sensorgen.prediction.array.readout import ArrayReadout, broken_where_dead, faulty
@@ -116,7 +116,7 @@ def test_intervals_hold_and_the_foot_is_found(model, kind):
     """Scatter of 5 % at rest and in gain, noise of 0.1 %: 95 % of the pressures in their intervals."""
     readout, pressure = ArrayReadout(kind), np.concatenate([np.zeros((3, 5, 6)), PRESSURE / 1e3])
     inside, off = [], []
-    for seed in range(8):
+    for seed in range(4):
         found = maps(model, readout, simulated(model, readout, pressure, seed=seed), scatter=0.05, surface=True)
         low, high = found.interval_kpa
         inside.append((low < PRESSURE / 1e3) & (high > PRESSURE / 1e3))
@@ -146,13 +146,10 @@ def test_what_is_not_read_is_not_no_pressure(model):
     assert static.png(plots.figure(broken, PRESSURE))[:4] == b"\x89PNG"
 
 
-TWO_TRACKS = (["c3:0", "r2:3"], ["c5:0", "c6:0"], ["c3:2", "r5:1"], ["r4:0", "c2:1"])
-
-
 @pytest.mark.parametrize(
-    ("faults", "turned"), [(["r2:4"], False), (["r4:0"], False), *((pair, False) for pair in TWO_TRACKS),
-                           (["r1:3", "c2:1"], True), (["r5:2", "r3:1"], True)],
-)  # fmt: skip
+    ("faults", "turned"),
+    [(["r2:4"], False), (["c3:0", "r2:3"], False), (["r4:0", "c2:1"], False), (["r5:2", "r3:1"], True)],
+)
 def test_a_track_is_broken_where_its_crossings_are_dead_to_the_end(model, faults, turned):
     """And nothing else is, though the crossings of two dead tracks end all those across them."""
     tracks = model.tracks()
@@ -167,7 +164,7 @@ def test_a_track_is_broken_where_its_crossings_are_dead_to_the_end(model, faults
 
 
 @pytest.mark.parametrize(
-    ("faults", "lost"), [*((pair, None) for pair in TWO_TRACKS), (["c5:1", "c6:1", "r3c2"], None), (["r2:3"], 3)]
+    ("faults", "lost"), [(["c5:0", "c6:0"], None), (["c5:1", "c6:1", "r3c2"], None), (["r2:3"], 3)]
 )
 def test_what_faults_leave_is_right(model, faults, lost):
     """To 1 kPa at a noise by which the network inverts; faults are named, and crossings of no fault are determined."""
@@ -179,10 +176,9 @@ def test_what_faults_leave_is_right(model, faults, lost):
         assert np.isnan(left.pressure_kpa[0]).sum() == lost
 
 
-@pytest.mark.parametrize("fault", ["c3:0", "r2:3"])
-def test_two_terminals_keep_what_a_broken_track_leaves(model, fault):
+def test_two_terminals_keep_what_a_broken_track_leaves(model):
     readout = ArrayReadout("two-terminal", 50.0, (1e4,), 1e-3)
-    assert np.isfinite(maps(model, readout, frames_of(model, readout, faults=[fault])).pressure_kpa).any()
+    assert np.isfinite(maps(model, readout, frames_of(model, readout, faults=["r2:3"])).pressure_kpa).any()
 
 
 def test_beside_a_short_the_loose_part_of_a_broken_row_mixes_crossings_that_are_not_determined(model):
@@ -272,7 +268,7 @@ def test_lost_crossings_are_the_conditional_mean_of_a_gaussian_field(model, monk
 
 def test_errors_of_lost_crossings_hold_whatever_size_and_length_the_load_has(model):
     """Length and size by each frame alone: sums over lost crossings within 1.645 errors in 85 to 95 % of the draws."""
-    for length_mm in (12.0, 25.0, 40.0):
+    for length_mm in (12.0, 40.0):
         true, maps_ = fields(model, [10.0, 300.0], length_mm, 300, 3.0)
         kpa, sigma = (of.reshape(-1, 30)[:, LOST] for of in maps_.filled)
         off = kpa.sum(1) - true[:, LOST].sum(1)
@@ -420,8 +416,6 @@ def test_files_of_both_kinds_say_the_same(tmp_path, model):
         ("f.csv", "r1c1\nmany\n", "row 2, column r1c1: 'many' is not a number"),
         ("f.csv", "r1c1\n", "no rows below the header"),
         ("f.csv", "r1c1,r01c1\n1,2\n", "columns r1c1, r01c1 repeat"),
-        ("f.csv", "rest,r1c1,rest\n1,2,0\n", "columns rest, rest repeat"),
-        ("f.csv", "r0c1\n1\n", "columns r0c1; expected r1c1 to r5c6"),
         ("f.csv", "time_ms,frequency_hz,r1c1\n0,1e4,1e-12\n", "'time_ms' is not read; expected the time as time_s"),
         ("f.csv", "time_s,frequency_hz,r1c1\n1,1e4,1e-12\n0,1e4,1e-12\n", "time_s does not rise"),
         ("f.npz", "text", "no NPZ file"),
@@ -464,14 +458,3 @@ def test_a_file_at_rest_gives_what_it_marks_and_its_own_frequency(tmp_path):
         read(path, (5, 6), 2e4)
     np.savez(path, siemens=values)
     assert len(read(path, (5, 6), 1e4).at_rest()) == 3
-
-
-def test_a_virtual_step_is_a_recording(tmp_path, model):
-    (tmp_path / "step.npz").write_bytes(step(model, ArrayReadout()))
-    found = read(tmp_path / "step.npz", (5, 6), None)
-    assert found.siemens.shape == (65, 5, 6)
-    assert found.rest.sum() == 5
-    back = inverted(model, ArrayReadout(), found.siemens, found.rest, found.time_s)
-    true = found.pressure_kpa[~found.rest]
-    off = back.force_n[0] - true.sum((1, 2)) * 0.1
-    assert np.abs(off / back.force_n[1]).max() < 3.5

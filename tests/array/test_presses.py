@@ -28,9 +28,9 @@ def test_a_press_on_squares_has_its_force(model):
     assert corner[2:4, 3:5] == pytest.approx(np.full((2, 2), 15e3))
 
 
-@pytest.mark.parametrize("noise", [1e-3, 1e-2])
-def test_fitted_presses_are_as_far_apart_as_stated(model, noise):
+def test_fitted_presses_are_as_far_apart_as_stated(model):
     """At the distance stated the fitted one errs by less than a third of it, by the median; another network solves."""
+    noise = 1e-2
     readout = ArrayReadout(noise=noise)
     distance, draw = study(model, readout, 60.0).apart_mm, np.random.default_rng(1)
     x, y = model.layout.x_mm[4], model.layout.y_mm[3]

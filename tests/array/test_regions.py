@@ -67,7 +67,7 @@ NO_AREA = [[0, 0], [0, 50]]
 CROSSED = [[0, 0], [9, 9], [0, 9], [9, 0]]
 
 
-@pytest.mark.parametrize("corners", [[], [[0, 0]], NO_AREA, [[70, 0], [90, 9]], CROSSED, [[0, 0, 1], [9, 9]]])
+@pytest.mark.parametrize("corners", [[[0, 0]], NO_AREA, [[70, 0], [90, 9]], CROSSED, [[0, 0, 1], [9, 9]]])
 def test_no_region_is_an_error(corners):
     with pytest.raises(BadInput, match=r"regions\.odd: no area with a crossing"):
         _ = array_of(SIZE, regions={"odd": corners}).regions

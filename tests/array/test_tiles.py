@@ -26,8 +26,7 @@ def array(**parameters):
     return make({"shape": "array", "parameters": parameters, "cell": {"parameters": {"dielectric_mm": 0.4}}})
 
 
-@pytest.mark.parametrize("kind", ["raised", "engraved"])
-@pytest.mark.parametrize("pads", ["bottom", "left"])
+@pytest.mark.parametrize(("kind", "pads"), [("raised", "bottom"), ("engraved", "left")])
 def test_names_can_be_read_beside_the_pads(kind, pads):
     design = array(length_mm=120, width_mm=20, labels=kind, pads=pads)
     scene = design.drawn

@@ -48,8 +48,7 @@ def test_ngspice_solves_the_same_array(program, tmp_path):
     assert np.abs(found / theirs - 1).max() < 1e-8
 
 
-@pytest.mark.parametrize("readout", READOUTS)
-@pytest.mark.parametrize("shape", [(5, 4), (3, 6)])
+@pytest.mark.parametrize(("readout", "shape"), [(READOUTS[0], (5, 4)), (READOUTS[1], (3, 6))])
 def test_currents_of_crossings_agree_and_so_do_slopes(readout, shape):
     tracks, two = some(*shape), readout == "two-terminal"
     found = readings(tracks, 50e3, readout=readout)

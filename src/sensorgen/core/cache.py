@@ -11,7 +11,7 @@ from contextvars import ContextVar
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from sensorgen.core import files as store
 from sensorgen.core.errors import Unwritable
@@ -24,6 +24,7 @@ _SOURCES = (  # what decides an answer
 )  # fmt: skip
 
 JSON = Any  # None, bool, int, float, str, and lists and string-keyed dicts of these
+Record = TypeVar("Record")
 
 _HELD_BACK: ContextVar[MutableSequence[tuple[Mapping[str, JSON], JSON]] | None] = ContextVar("_HELD_BACK", default=None)
 _ONLY_KNOWN: ContextVar[bool] = ContextVar("_ONLY_KNOWN", default=False)
@@ -59,6 +60,15 @@ def answer(question: Mapping[str, JSON], work: Callable[[], JSON]) -> JSON:
         result = work()
         keep(question, result)
     return result
+
+
+def record(question: Mapping[str, JSON], kind: type[Record], work: Callable[[], Record]) -> Record:
+    """The answer to a question as a record: a dataclass, kept as JSON; as of :func:`answer`."""
+    from sensorgen.core.records import adapter
+
+    form = adapter(kind)  # type: ignore[arg-type]
+    known: Record = form.validate_json(answer(question, lambda: form.dump_json(work()).decode()))
+    return known
 
 
 @contextmanager

@@ -7,8 +7,8 @@ expected time and error, and run one after the other. Both are scaled from measu
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from functools import cache, lru_cache
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache, partial
 from hashlib import sha256
 from importlib import resources
 from json import dumps
@@ -19,6 +19,7 @@ from sensorgen import models
 from sensorgen.core import cache as cached
 from sensorgen.core import yamlfile
 from sensorgen.core.bounds import Disc, Interval
+from sensorgen.core.display import Boundless
 from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.lazy import by_key
 from sensorgen.design.body import Cells
@@ -161,7 +162,7 @@ def default_width(scene: Scene) -> float:
 
 
 @dataclass(frozen=True)
-class Answer:
+class Answer(Boundless):
     """A model's capacitance, and what the models before it refused.
 
     Attributes
@@ -285,9 +286,9 @@ def capacitance(
     if not keep:
         return _asked(scene, permittivity, width, model)
     question = _question(scene, permittivity, width, model)
-    known = cached.known(question)
-    data = known or cached.answer(question, lambda: _plain(_asked(scene, permittivity, width, model)))
-    return replace(_of_plain(data), known=known is not None)
+    known = cached.known(question) is not None
+    answer = cached.record(question, Answer, partial(_asked, scene, permittivity, width, model))
+    return replace(answer, known=known)
 
 
 def weighed(scene: Scene, width: float) -> tuple[PlanCandidate, ...]:
@@ -377,19 +378,16 @@ def _parts(bound: Interval | Disc) -> tuple[Interval, Interval | None]:
 def _refuse_contradiction(bounds: Mapping[str, Interval | Disc]) -> None:
     """All of them hold the truth: any two overlap."""
     for part in zip(*(_parts(bound) for bound in bounds.values()), strict=True):
-        named = {name: bound for name, bound in zip(bounds, part, strict=True) if bound}
-        if named:
-            _refuse_apart(named)
-
-
-def _refuse_apart(bounds: Mapping[str, Interval]) -> None:
-    lower = max(bounds, key=lambda name: bounds[name].lower)
-    upper = min(bounds, key=lambda name: bounds[name].upper)
-    if bounds[lower].lower > bounds[upper].upper * (1 + _EXACT):
-        raise Contradiction(
-            f"{lower} says at least {bounds[lower].lower:.9g} F, {upper} at most {bounds[upper].upper:.9g} F: one of "
-            "them fails on this scene; report it, and use neither"
-        )
+        named = [(name, bound) for name, bound in zip(bounds, part, strict=True) if bound]
+        if not named:
+            continue
+        highest, low = max(named, key=lambda each: each[1].lower)
+        lowest, high = min(named, key=lambda each: each[1].upper)
+        if low.lower > high.upper * (1 + _EXACT):
+            raise Contradiction(
+                f"{highest} says at least {low.lower:.9g} F, {lowest} at most {high.upper:.9g} F: one of them fails on "
+                "this scene; report it, and use neither"
+            )
 
 
 def _idle(candidate: PlanCandidate, bounds: Mapping[str, Interval | Disc], width: float) -> str:
@@ -421,20 +419,6 @@ def _question(scene: Scene, permittivity: Mapping[str, complex], width: float, m
         "width": width if width < inf else None,
         "model": model,
     }
-
-
-def _plain(answer: Answer) -> dict[str, Any]:
-    """An answer as plain data."""
-    return asdict(answer) | {"wanted": answer.wanted if answer.wanted < inf else None}
-
-
-def _of_plain(data: dict[str, Any]) -> Answer:
-    """An answer from plain data."""
-    return Answer(
-        data["model"], Interval(**data["capacitance_f"]), tuple(data["refused"]),
-        inf if data["wanted"] is None else data["wanted"], tuple(PlanCandidate(**c) for c in data["plan"]),
-        loss_f=Interval(**data["loss_f"]) if data["loss_f"] else None,
-    )  # fmt: skip
 
 
 def is_plate(answer: Answer, scene: Scene) -> bool:

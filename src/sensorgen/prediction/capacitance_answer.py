@@ -2,13 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from math import inf
 from typing import Annotated
 
 from sensorgen.core import cache
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Facts, Part, Table
-from sensorgen.core.records import adapter
 from sensorgen.core.units import M_PER_MM, si
 from sensorgen.design.body import Body
 from sensorgen.design.values import MaterialValue
@@ -174,12 +174,10 @@ def answer(body: Body, asked: CapacitanceQuestion) -> CellCapacitance:
     """
     if not asked.keep or asked.width == inf:
         return _computed(body, asked)
-    question, form = {"what": "cell", "body": body.identity, **asdict(asked)}, adapter(CellCapacitance)
+    question = {"what": "cell", "body": body.identity, **asdict(asked)}
     known = cache.known(question) is not None
-    found: CellCapacitance = form.validate_json(
-        cache.answer(question, lambda: form.dump_json(_computed(body, asked)).decode())
-    )
-    return replace(found, design=body.design.name, body=body.provenance, known=known or found.known)
+    cell = cache.record(question, CellCapacitance, partial(_computed, body, asked))
+    return replace(cell, design=body.design.name, body=body.provenance, known=known or cell.known)
 
 
 def _computed(body: Body, asked: CapacitanceQuestion) -> CellCapacitance:

@@ -368,7 +368,7 @@ def planned(body: Body, asked: PressQuestion) -> Plan:
         PlanCandidate(name, passed_over=f"--model {model}" if asked.model else _unfit(piece, name))
         for name in ALL if name != model
     ]  # fmt: skip
-    meshes = _mesh_levels(piece, model, asked)
+    meshes = mesh_ladder.mesh_levels(piece, model, len(asked.stress_kpa) - 1)
     reach = [PlanCandidate(mesh.name, max(mesh.rise_error, mesh_ladder.VERIFIED), mesh.seconds) for mesh in meshes]
     candidates = (*passed_over, *reach)
     level = Level("compression", _MEASURE, asked.accuracy, candidates, cheapest(candidates, asked.accuracy))
@@ -391,16 +391,12 @@ def _model(body: Body, asked: PressQuestion) -> str:
     )
 
 
-def _mesh_levels(piece: PressedPiece, model: str, asked: PressQuestion) -> list[mesh_ladder.MeshLevel]:
-    return mesh_ladder.mesh_levels(piece, model, len(asked.stress_kpa) - 1)
-
-
 def _within(body: Body, asked: PressQuestion, step: Step | None) -> CompressionResult:
     """The first mesh within tolerance, from the expected one upwards; the best where none is."""
     plan, case = planned(body, asked), _case(body, asked)
     find = {
         mesh.name: partial(_estimated, case, asked, mesh.level, step)
-        for mesh in _mesh_levels(case.piece, case.model, asked)
+        for mesh in mesh_ladder.mesh_levels(case.piece, case.model, len(asked.stress_kpa) - 1)
     }
     estimate, level = run_until_within(plan.levels[0], find, _rise_error)
     return replace(

@@ -127,7 +127,7 @@ def law_of(
         raise OutOfRange(f"{condition}; {design.shape} has gaps: expected 'unconfined' or the sides symmetric")
     stored = None if name in ("unconfined", "infill") else _stored(design, printed)
     if stored and until_pa <= _PAST * stored.stress_pa[-1]:
-        return _stored_law(stored, moduli, tip, usual=_is_usual(design, tip))
+        return _stored_law(design, stored, moduli, tip)
     if name == "solved":
         return solved(design, printed, tip=tip, until_pa=until_pa)
     return _unsolved(design, moduli[film(design)], name, piece)
@@ -315,33 +315,23 @@ def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> st
 
     "" of other cells.
     """
+    parts = _places(piece.scene, turned=turned)
+    rounded = sorted((b.material, b.terminal, [[round(v, digits) for v in at] for at in places]) for b, places in parts)
+    return sha256(dumps([rounded, piece.period_mm]).encode()).hexdigest()[:16] if parts else ""
+
+
+def _places(scene: Scene, *, turned: bool) -> list[tuple[Body, Sequence[Point]]]:
+    """Bodies of a cell by the corners of their cross-section, else by the spans of their boxes; none of other cells."""
     try:
-        section, *others = sections(piece.scene)
+        section, *others = sections(scene)
     except ValueError:
-        return ""
-    if others:
-        return "" if turned else _boxes_content(piece, digits)
-    outlines = [outline for _, outline in section.regions]
-    if turned:
-        outlines = _mirrored(outlines)
-    regions = sorted(
-        (body.material, body.terminal, [[round(v, digits) for v in corner] for corner in outline])
-        for (body, _), outline in zip(section.regions, outlines, strict=True)
-    )
-    return _hashed([regions, piece.period_mm])
-
-
-def _boxes_content(piece: PressedPiece, digits: int) -> str:
-    """Identity of a cell of boxes; "" where another body is in it."""
-    parts = [(body, p) for body in piece.scene.bodies for p in body.pieces]
-    if not all(p.is_box() for _, p in parts):
-        return ""
-    spans = sorted((b.material, b.terminal, [[round(v, digits) for v in p.span(n)] for n in "xyz"]) for b, p in parts)
-    return _hashed([spans, piece.period_mm])
-
-
-def _hashed(values: list[object]) -> str:
-    return sha256(dumps(values).encode()).hexdigest()[:16]
+        return []
+    if not others:
+        bodies, outlines = zip(*section.regions, strict=True)
+        return list(zip(bodies, _mirrored(outlines) if turned else outlines, strict=True))
+    boxes: list[tuple[Body, Sequence[Point]]]
+    boxes = [(body, [p.span(axis) for axis in "xyz"]) for body, p in scene.pieces if p.is_box()]
+    return boxes if len(boxes) == len(scene.pieces) and not turned else []
 
 
 def _mirrored(outlines: Sequence[tuple[Point, ...]]) -> list[tuple[Point, ...]]:
@@ -442,16 +432,12 @@ def _ends(curve: CapacitanceCurve) -> tuple[CapacitanceCurve, CapacitanceCurve]:
     return least, most
 
 
-def _stored_law(even: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tip: Tip, *, usual: bool) -> Law:
-    """Law of a stored cell, solved under an even pressure, and under the ``usual`` block."""
+def _stored_law(design: Design, even: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tip: Tip) -> Law:
+    """Law of a stored cell, solved under an even pressure, and under a block at least as high as the usual one."""
     tops = {EVEN: even, STIFF: even.scaled_rise(1 + even.stiff_change)}
-    return _cell(tops.get(tip.block) or even.under_block(usual=usual), moduli, tops)
-
-
-def _is_usual(design: Design, tip: Tip) -> bool:
-    """Test whether a tip is the block that stored cells were pressed with, or a higher one."""
     modulus_pa = design.material(Tip.block).value("youngs_modulus_pa").value
-    return tip.block == Tip.block and tip.height_m >= Tip.height_m and modulus_pa == compression.BLOCK_PA
+    usual = tip.block == Tip.block and tip.height_m >= Tip.height_m and modulus_pa == compression.BLOCK_PA
+    return _cell(tops.get(tip.block) or even.under_block(usual=usual), moduli, tops)
 
 
 def stresses_pa(until_pa: float) -> tuple[float, ...]:

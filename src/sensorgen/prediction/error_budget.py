@@ -35,14 +35,13 @@ from sensorgen.prediction.query import NOISE, Load
 from sensorgen.prediction.reference_load import Assumption, Dispersed, ReferenceLoad
 from sensorgen.prediction.rest_state import added, permittivity_ratios
 from sensorgen.prediction.results import Changes, ErrorBudget, Term
-from sensorgen.prediction.sensor_model import SensorModel, piece
+from sensorgen.prediction.sensor_model import RICHARDSON, SensorModel, piece
 from sensorgen.scene.layers import drawn, united
 from sensorgen.scene.scene import Scene
 
 _NEAR = 1.01  # ratio of moduli that are not told apart
 _MODEL = "model"
 _BY_RATIO = 2.2  # relative deformation per Poisson's ratio below that taken [-]
-_RICHARDSON = 4 / 3  # of what halving changes, where errors fall by four
 
 
 def error_budget(
@@ -104,7 +103,7 @@ def _models(model: SensorModel) -> Iterator[Assumption]:
         yield of("line", "one section under the tip is exact", sensors=[sensor])
     else:
         finer = [replace(sensor, pieces=2 * sensor.pieces)]
-        yield of("line", f"{sensor.pieces} sections under the tip", sensors=finer, factor=_RICHARDSON)
+        yield of("line", f"{sensor.pieces} sections under the tip", sensors=finer, factor=RICHARDSON)
     profiles = [replace(sensor, profile=name) for name in PROFILES if name != sensor.profile]
     yield of("tip", f"pressure distributed like {', '.join(s.profile for s in profiles)}", sensors=profiles)
 

@@ -10,11 +10,10 @@ from typing import Any
 
 from sensorgen.core import cache, parallel
 from sensorgen.core.errors import SensorgenError
-from sensorgen.core.records import adapter
 from sensorgen.design.body import Body
 from sensorgen.prediction import bodies
 from sensorgen.prediction.query import DEFAULT, Query
-from sensorgen.prediction.results import SCHEMA, Prediction, from_json
+from sensorgen.prediction.results import SCHEMA, Prediction
 
 _AHEAD: ContextVar[Callable[[], object]] = ContextVar("_AHEAD", default=lambda: None)
 
@@ -101,8 +100,8 @@ def _predict(of: Callable[[], Body], query: Query) -> None:
 
 def _stored(body: Body, query: Query) -> Prediction:
     question = {"what": "prediction", "body": body.identity, "query": asdict(query), "schema": SCHEMA}
-    text = cache.answer(question, lambda: adapter(Prediction).dump_json(_computed(body, query)).decode())
-    return replace(from_json(text), design=body.design.name, body=body.provenance)
+    prediction = cache.record(question, Prediction, partial(_computed, body, query))
+    return replace(prediction, design=body.design.name, body=body.provenance)
 
 
 def _computed(body: Body, query: Query) -> Prediction:

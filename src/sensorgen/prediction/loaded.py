@@ -9,8 +9,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sensorgen.core.arrays import Complex
 from sensorgen.core.display import Boundless, Displayed
 from sensorgen.core.document import Cell, Column, Part, Table, apart
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
@@ -21,7 +22,7 @@ from sensorgen.models import refusal
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
-from sensorgen.prediction.query import Load, Query
+from sensorgen.prediction.query import Query
 from sensorgen.prediction.results import Prediction, timeless
 from sensorgen.prediction.sensor_model import SensorModel, rough_sensor, sensor_model
 from sensorgen.prediction.sweep import Sweeper
@@ -29,8 +30,6 @@ from sensorgen.prediction.sweep import Sweeper
 LARGEST = 2_000_000  # impedances that are kept in memory at once
 ROWS = 4096  # of CSV at a time
 FORCES_N = tuple(k / 10 for k in range(61))  # up to the thesis's 6 N
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,11 +136,6 @@ def positions_mm(design: Design) -> tuple[float, ...]:
     """A hundred equal steps along a design's sensor [mm]."""
     length = float(design.params.length_mm)
     return (*(length * k / 100 for k in range(100)), length)
-
-
-def hardest(frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float]) -> Load:
-    """The reference load of a grid: the largest force at the middle position."""
-    return Load(tuple(frequency_hz), force_n[-1], position_mm[len(position_mm) // 2] * M_PER_MM)
 
 
 def csv_blocks(
@@ -415,8 +409,7 @@ def loaded(body: Body, query: Query, force_n: Sequence[float] = (), position_mm:
         As :func:`sensorgen.prediction.evaluate.sensor_model`; a load that the sensor cannot take.
     """
     axes = query.frequency_hz, tuple(force_n) or FORCES_N, tuple(position_mm) or positions_mm(body.design)
-    reference = hardest(*axes)
-    query = replace(query, force_n=reference.force_n, position_m=reference.position_m)
+    query = replace(query, force_n=axes[1][-1], position_m=axes[2][len(axes[2]) // 2] * M_PER_MM)
     rough = rough_sensor(body, query.law, query.tip_of(body.design), query.force_n)
     at_m = [x * M_PER_MM for x in axes[2]]
     whole = at_m if position_mm else [x for x in at_m if rough.sensor.whole(x)]

@@ -125,18 +125,6 @@ def _by_slicer(design: Design, slicer: str, step: Step, program: str) -> tuple[P
     question = _question(design, slicer, program)
     if stored.known(question) is None and not _fits(design):
         return None, "it does not fit the bed"
-    return _sliced(design, slicer, program, question, step), ""
-
-
-def _fits(design: Design) -> bool:
-    """Test whether a design fits the bed, or a waiver says so."""
-    from sensorgen.checks import rules
-
-    return all(f.waiver for f in design.waived(list(rules.bed_findings(design.printed, design.machine))))
-
-
-def _sliced(design: Design, slicer: str, program: str, question: dict[str, Any], step: Step) -> PrintFile:
-    """A design sliced now or before."""
 
     def work() -> dict[str, Any]:
         from sensorgen.prediction.new_slice import slice_now
@@ -145,7 +133,14 @@ def _sliced(design: Design, slicer: str, program: str, question: dict[str, Any],
         return {"report": sliced.record(), "gcode": b64encode(zlib.compress(sliced.content, 1)).decode()}
 
     entry = stored.answer(question, work)
-    return PrintFile(entry["report"] | {"name": design.name}, zlib.decompress(b64decode(entry["gcode"])))
+    return PrintFile(entry["report"] | {"name": design.name}, zlib.decompress(b64decode(entry["gcode"]))), ""
+
+
+def _fits(design: Design) -> bool:
+    """Test whether a design fits the bed, or a waiver says so."""
+    from sensorgen.checks import rules
+
+    return all(f.waiver for f in design.waived(list(rules.bed_findings(design.printed, design.machine))))
 
 
 def _question(design: Design, slicer: str, program: str) -> dict[str, Any]:

@@ -435,14 +435,11 @@ class Prediction(Boundless, Displayed):
 
     def _words_of_quantities(self) -> dict[str, str | None]:
         """Quantities of the summary in words, by name."""
-        force, position = self.resolved()
-        return {
-            "electrode gap": _words(self.gap),
-            "capacitance": self.capacitance.words() if self.capacitance else self.status,
-            **{f"{end} electrode": _words(bounds) for end, bounds in self.resistance.items()},
-            "sensitivity [1/kPa]": (_words(self.sensitivity) or "–").replace(" 1/kPa", ""),
-            "force resolution": force, "position resolution": position,
-        }  # fmt: skip
+        words = {name: bounds.words() if bounds else None for name, bounds in self.quantities().items()}
+        words["capacitance"] = words["capacitance"] or self.status
+        words["sensitivity"] = (words["sensitivity"] or "–").replace(" 1/kPa", "")
+        words["force resolution"], words["position resolution"] = self.resolved()
+        return {f"{name} [1/kPa]" if name == "sensitivity" else name: of for name, of in words.items()}
 
     def quantities(self) -> dict[str, Bounds | None]:
         """Quantities of the summary by name; resolutions as on a bench."""
@@ -474,7 +471,7 @@ class Prediction(Boundless, Displayed):
         yield ""
         yield self._ranges()
         if self.impedance:
-            yield f"corner frequency {_words(self.corner_frequency) or 'undefined'}"
+            yield f"corner frequency {self.corner_frequency.words() if self.corner_frequency else 'undefined'}"
             yield ""
             columns = (
                 Column("at rest", "Hz", si=True), Column("Re", "ohm", digits=5), Column("range"),
@@ -627,10 +624,6 @@ def _numbers(of: Sequence[Bounds | None]) -> Iterator[str | float | None]:
     yield next((bounds.unit for bounds in of if bounds), "")
     for bounds in of:
         yield from (bounds.value, bounds.lower, bounds.upper) if bounds else (None, None, None)
-
-
-def _words(bounds: Bounds | None) -> str | None:
-    return None if bounds is None else bounds.words()
 
 
 def _range(bounds: Bounds) -> str:

@@ -186,7 +186,7 @@ def _contact(body: Body, law: Law, pressed: PressedPiece, profile: str, radius_m
 ACCURACY = 1e-2  # of abs(Z), where none is asked for: material data are not that accurate
 SECTIONS = (4, 8, 16, 32, 64, 128, 256)  # that a tip whose pressure is not uniform may be cut into
 _NAMES = {f"line, {n} section{'s' * (n > 1)}": n for n in (1, *SECTIONS)}
-_RICHARDSON = 4 / 3  # of what halving a section changes, where errors fall by four
+RICHARDSON = 4 / 3  # of what halving a section changes, where errors fall by four
 _NUDGE = 0.01  # of the capacitance, to find its effect on abs(Z)
 _WIDTH_OF_C, _ERROR_OF_Z = "relative width of C", "error of |Z|"
 
@@ -203,8 +203,6 @@ class PredictionPlan:
         Laws of compression to choose from, by the answer for the capacitance.
     rough : SensorModel
         By closed-form models.
-    by_capacitance : float
-        Relative change of abs(Z) over that of the capacitance [-].
     plan : Plan
         What should meet the tolerance.
     """
@@ -214,7 +212,6 @@ class PredictionPlan:
     tip: Tip
     options: Callable[[Answer], list[LawOption]]
     rough: SensorModel
-    by_capacitance: float
     plan: Plan
 
 
@@ -272,7 +269,7 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
     width = min(wanted, 2 * share / by_capacitance, default_width(body.cells.first()))
     levels = (_cell(rough, width), _compression(laws(rough.rest.answer), sensor, load, share), line)
     at = f"|Z| at {load.force_n:g} N and {load.position_m * 1e3:g} mm, at the worst frequency"
-    return PredictionPlan(body, load, tip, laws, rough, by_capacitance, Plan(wanted, at, levels))
+    return PredictionPlan(body, load, tip, laws, rough, Plan(wanted, at, levels))
 
 
 def _inexpensive(
@@ -318,7 +315,8 @@ def execute(planned: PredictionPlan) -> tuple[SensorModel, Plan]:
     line = _line(model.sensor, load, _left(accuracy - spent, line), line)
     if model.sensor.profile != UNIFORM:
         model = replace(model, sensor=replace(model.sensor, pieces=_NAMES[line.chosen]))
-    levels = (_results(cell, rest.answer), compression, line)
+    tried = rest.answer.plan or (PlanCandidate(rest.answer.model, width=rest.answer.width()),)
+    levels = (replace(cell, candidates=tried, chosen=rest.answer.model), compression, line)
     return model, replace(planned.plan, levels=levels, width=spent + (line.choice.width or 0.0))
 
 
@@ -340,11 +338,6 @@ def _cell(rough: SensorModel, width: float) -> Level:
         for c in weighed(rough.body.cells.first(), width)
     )
     return Level("cell", _WIDTH_OF_C, width, candidates, cheapest(candidates, width))
-
-
-def _results(cell: Level, answer: Answer) -> Level:
-    candidates = answer.plan or (PlanCandidate(answer.model, width=answer.width()),)
-    return replace(cell, candidates=candidates, chosen=answer.model)
 
 
 def _compression(laws: list[LawOption], sensor: Sensor, load: Load, allowed: float) -> Level:
@@ -388,7 +381,7 @@ def _line(sensor: Sensor, load: Load, allowed: float, expected: Level | None = N
         if (pieces == 1) is (sensor.profile == UNIFORM) and not enough:
             begun = time.perf_counter()
             cut = replace(sensor, pieces=pieces)
-            error = 0.0 if pieces == 1 else _error(cut, load, replace(cut, pieces=2 * pieces), factor=_RICHARDSON)
+            error = 0.0 if pieces == 1 else _error(cut, load, replace(cut, pieces=2 * pieces), factor=RICHARDSON)
             seconds = time.perf_counter() - begun
             candidates.append(replace(before.get(name, PlanCandidate(name)), width=error, seconds=seconds))
     return Level("line", _ERROR_OF_Z, allowed, tuple(candidates), candidates[-1].model)

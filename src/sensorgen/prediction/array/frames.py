@@ -516,15 +516,11 @@ class MapInverter:
 
     @cached_property
     def _rest(self) -> tuple[Real, Mask]:
+        """Capacitances at rest of this print, with the network, and which of them settled, (m, n) [F]."""
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.nan_to_num(self.rest_s.imag / self.nominal.siemens.imag, nan=1.0, posinf=1.0, neginf=1.0)
         start = self.model.capacitances() * np.where(self.model.here, np.clip(ratio, 0.1, 10.0), 1.0)
         return self.capacitances(self.rest_s, start)
-
-    @property
-    def rest_f(self) -> Real:
-        """Capacitances at rest of this print, with the network, (m, n) [F]."""
-        return self._rest[0]
 
     @cached_property
     def own(self) -> Mask:
@@ -555,7 +551,7 @@ class MapInverter:
     def error(self) -> Real:
         """Error of C/C0 by noise, (m, n) [-]."""
         variance = self.gain[1].reshape(self.model.here.shape)
-        return np.asarray(np.sqrt(variance) / np.where(self.model.here, self.rest_f, 1.0))
+        return np.asarray(np.sqrt(variance) / np.where(self.model.here, self._rest[0], 1.0))
 
     @cached_property
     def correlation(self) -> "Real | None":

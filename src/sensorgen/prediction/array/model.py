@@ -136,7 +136,7 @@ def fringe(of: CrossingSection) -> Fringe:
 
 
 PA_PER_KPA, PA_PER_MPA = 1e3, 1e6
-USUAL_KPA = 90.0  # of 6 N on 8 x 8 mm
+_USUAL_KPA = 90.0  # pressure on a cell up to which its law is wanted: of 6 N on 8 x 8 mm
 _N_PER_KPA_MM2 = 1e-3
 _NEWTON = 12  # steps: the law is smooth and nearly straight
 _FELT = 1e-4  # of a pressure: less is not spread
@@ -187,10 +187,7 @@ class ArrayModel:
     @property
     def layout(self) -> ArrayLayout:
         """Tracks in plan."""
-        found = self.design.layout
-        if found is None:
-            raise BadInput(f"{self.design.name}: {self.design.shape} has no crossings; expected shape: array")
-        return found
+        return _layout(self.design)
 
     @cached_property
     def here(self) -> np.ndarray:
@@ -485,15 +482,13 @@ def wire_table(design: Design) -> Table:
     return Table.of("wires", "", _of_crossing(design, rough_sensor(bodies.default_body(design.crossing))).wires())
 
 
-def array_model(design: Design, until_kpa: float = USUAL_KPA, body: Body | None = None) -> ArrayModel:
+def array_model(design: Design, body: Body | None = None) -> ArrayModel:
     """Numbers of an array as printed: by G-code of one crossing where a slicer is there, else estimated.
 
     Parameters
     ----------
     design : Design
         An array.
-    until_kpa : float
-        Pressure on a cell up to which its law is wanted [kPa]; beyond the usual one a cell is solved, for a minute.
     body : Body, optional
         Of one crossing, in place of that.
 
@@ -507,7 +502,7 @@ def array_model(design: Design, until_kpa: float = USUAL_KPA, body: Body | None 
     from sensorgen.prediction.sensor_model import sensor_model
 
     p = _layout(design).params
-    query = Query(force_n=until_kpa * p.column_mm * p.row_mm * _N_PER_KPA_MM2)
+    query = Query(force_n=_USUAL_KPA * p.column_mm * p.row_mm * _N_PER_KPA_MM2)
     return _of_crossing(design, sensor_model(body or bodies.default_body(design.crossing), query)[0])
 
 

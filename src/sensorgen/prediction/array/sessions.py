@@ -229,15 +229,9 @@ def _changed(base: elements.LawForm, change: str) -> list[elements.LawForm]:
 
 def _left_out(sessions: Sequence[elements.ArraySession], form: elements.LawForm) -> float:
     """Mean over sessions of the median error of an element in a session left out [kPa]; by totals where alone [N]."""
-    if len(sessions) < 2:
-        return float("inf")
     scale = elements.scale_of(sessions, form)
     sums = [elements.sums_of(session, form, scale) for session in sessions]
-    found = []
-    for k, own in enumerate(sums):
-        law = _law(sums[:k] + sums[k + 1 :], form, scale)
-        found.append(_error(own, law))
-    return float(np.mean(found))
+    return float(np.mean([_error(own, _law(sums[:k] + sums[k + 1 :], form, scale)) for k, own in enumerate(sums)]))
 
 
 def _error(own: elements.Sums, law: elements.ElementLaw) -> float:

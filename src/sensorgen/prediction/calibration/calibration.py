@@ -17,7 +17,7 @@ from sensorgen.models.compression import CapacitanceCurve, Plate
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.calibration.fitting import Data, Posterior, calibrated
 from sensorgen.prediction.calibration.inversion import OTHERWISE, InvertedPresses, Inverter
-from sensorgen.prediction.calibration.materials import Link, MaterialEstimate, estimate, source_text
+from sensorgen.prediction.calibration.materials import TOLD, Link, MaterialEstimate, estimate, source_text
 from sensorgen.prediction.calibration.rest import Baseline
 from sensorgen.prediction.calibration.specimen import FORCES_N, Presses, SpecimenModel, Spread
 from sensorgen.prediction.inference import NORMAL_90, Parameter
@@ -104,7 +104,6 @@ def held_out(
 
 
 SCHEMA = 2
-_TOLD = 0.8  # of the prior's standard deviation: a parameter that keeps more was not identified
 BEYOND = 1.25  # times the largest known force: up to which a press is looked for
 _LAWS = {"plate": Plate, "curve": CapacitanceCurve}
 
@@ -243,7 +242,7 @@ class Calibration(Displayed):
         sd = sqrt(weights @ self.posterior.covariance @ weights)
         ends = np.array([at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90 * before, NORMAL_90 * before])
         middle, lower, upper, *prior = (parameter.shown * parameter.at(ends)).tolist()
-        by = "presses and rest" if sd / before < _TOLD else "prediction"
+        by = "presses and rest" if sd / before < TOLD else "prediction"
         return CalibratedValue(parameter.key, parameter.unit, middle, lower, upper, prior[0], prior[1], by)
 
     @property

@@ -9,6 +9,7 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.prediction import inference
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, no_presses
 from sensorgen.prediction.inference import LocalFit, Normal, parts, whitening
+from sensorgen.prediction.inverse.forward import pairs
 
 ROUNDS = 3  # Gauss-Newton and variance components in turn
 NOISE = 1e-3  # of the parts of a ratio, where no press tells
@@ -225,12 +226,6 @@ def covariances(model: SpecimenModel, at: Real, data: Data, components: Real, ve
     for (name, course), (_, sd) in zip(courses, _USUAL, strict=True):
         variance[:, 0] += np.where(np.isnan(course), (model.value(name, at) * sd) ** 2, 0.0)
     return np.asarray(own + np.einsum("nik,nk,njk->nij", vectors, variance, vectors))
-
-
-def pairs(force_n: Real, position_m: Real) -> tuple[Real, Real]:
-    """Forces and positions of all points of a grid, along positions first."""
-    force, position = np.meshgrid(force_n, position_m, indexing="ij")
-    return force.ravel(), position.ravel()
 
 
 def usual_presses(posterior: Posterior, force_n: Real, position_m: Real) -> Presses:

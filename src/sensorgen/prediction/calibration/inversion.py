@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.prediction.calibration.fitting import Posterior, by_rest, pairs, readings, usual_presses
+from sensorgen.prediction.calibration.fitting import Posterior, by_rest, readings, usual_presses
 from sensorgen.prediction.calibration.rest import LOADS_N, STALE_S, Rest, load_probabilities
 from sensorgen.prediction.calibration.specimen import Bench, SpecimenModel, spread_of
 from sensorgen.prediction.inference import NORMAL_90, Index, cramer_rao, parts, whitening
 from sensorgen.prediction.inverse.estimator import Prior
-from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
+from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, pairs
 from sensorgen.prediction.inverse.verdict import PressAnswers, Worded, chi2_limit
 from sensorgen.prediction.sensor_model import SensorModel
 

@@ -30,7 +30,7 @@ _WIDTH = 1e-3  # of the capacitances behind that slope, relative
 _TRACKS, _CELLS = 0.02, 0.01  # of ln R and ln C: sizes of printed lines, and the model of the cell
 _PRESS, _PRESS_SHAPE = 0.05, 0.03  # of ln of the rise: tip 4.4 %, boundary 2.7 % (error budget); from force to force
 _BY_READINGS = "presses and rest"
-_TOLD = 0.8  # of the prior's standard deviation: a value that keeps more was not identified
+TOLD = 0.8  # of the prior's standard deviation: a value or parameter that keeps more was not identified
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ def estimate(model: SpecimenModel, posterior: Posterior, link: Link) -> Material
     sd = sqrt(float(link.spread**2 - link.spread**2 * (by @ slope) + by @ covariance @ by))
     value, lower, upper = (link.value * exp(ln_value + k * NORMAL_95 * sd) for k in (0, -1, 1))
     first, last = (link.value * exp(link.middle + k * NORMAL_95 * link.spread) for k in (-1, 1))
-    by_what = _BY_READINGS if sd < _TOLD * link.spread else "prediction"
+    by_what = _BY_READINGS if sd < TOLD * link.spread else "prediction"
     return MaterialEstimate(link.material, link.quantity, value, lower, upper, first, last, by_what)
 
 

@@ -220,13 +220,12 @@ class Required:
         """The required standard errors as a result."""
         return results.StandardErrors(sigma_force_n=self.force_n, sigma_position_m=self.position_m)
 
-    def force(self, sigma_n: float) -> str:
-        """Verdict on sensing force at a standard error [N]: yes, roughly or no."""
-        return _grade(sigma_n, self.force_n, self.guess_force_n)
-
-    def position(self, sigma_m: float) -> str:
-        """Verdict on locating a press at a standard error [m]: yes, roughly or no."""
-        return _grade(sigma_m, self.position_m, self.guess_position_m)
+    def grades(self, bounds: LeastErrors) -> tuple[str, str]:
+        """Verdicts on sensing force and on locating a press: yes, roughly or no."""
+        return (
+            _grade(float(bounds.force_n), self.force_n, self.guess_force_n),
+            _grade(float(bounds.position_m), self.position_m, self.guess_position_m),
+        )
 
 
 def required(setup: Setup) -> Required:
@@ -254,7 +253,7 @@ def verdict(setup: Setup, bounds: LeastErrors, need: Required, reason: str) -> s
 
 def bracket(free: LeastErrors, stiff: LeastErrors, need: Required) -> str:
     """The verdict where the law of compression lies anywhere between a free and a confined film."""
-    certain = ": what it cannot do is certain" if "no" in _grades(free, need) else ""
+    certain = ": what it cannot do is certain" if "no" in need.grades(free) else ""
     return (
         f"the film is assumed to expand sideways freely, the softest case{certain}; bonded to stiff electrodes, the "
         f"stiffest, it {_ability(stiff, need)} ({newtons(stiff.force_n)}, {metres(stiff.position_m)})"
@@ -262,12 +261,8 @@ def bracket(free: LeastErrors, stiff: LeastErrors, need: Required) -> str:
 
 
 def _ability(bounds: LeastErrors, need: Required) -> str:
-    force, position = _grades(bounds, need)
+    force, position = need.grades(bounds)
     return f"{_FORCE[force]} and {_POSITION[position]}"
-
-
-def _grades(bounds: LeastErrors, need: Required) -> tuple[str, str]:
-    return need.force(float(bounds.force_n)), need.position(float(bounds.position_m))
 
 
 SEARCHED = 40  # frequencies whose combinations are all tried

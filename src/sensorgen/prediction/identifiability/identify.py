@@ -274,31 +274,26 @@ def identify(
     helpful = most_helpful(setup, need)
     combined = together(setup, helpful) if helpful else None
     calibrated, uncalibrated = _on_a_bench(setup)
+    senses_force, locates = (None, None) if assumed else need.grades(limits)
+    stress = sensor.stress_pa(force_n, centre)
+    strain = float(sensor.compression.capacitive_strain(stress)[0])
+    press, bracket = results.ReferencePress(force_n, centre, sensor.tip_m, float(stress), strain), None
+    if stiffest:
+        stiff = setup.on(stiffest).bounds()
+        bracket = results.Stiffest(**vars(standard_errors(stiff)), verdict=fisher.bracket(limits, stiff, need))
     return results.Identifiability(
-        **vars(fisher.standard_errors(limits)), noise=noise, press=_press(setup),
+        **vars(fisher.standard_errors(limits)), noise=noise, press=press,
         corner_frequency_hz=sensor.corner_frequency_hz() if sensor.resistance_ohm() else None,
         required=need.errors(), reason=reason, assumed=assumed or None,
-        senses_force=None if assumed else need.force(float(limits.force_n)),
-        locates=None if assumed else need.position(float(limits.position_m)),
+        senses_force=senses_force, locates=locates,
         verdict=fisher.verdict(setup, limits, need, reason),
-        stiffest=_stiffest(setup.on(stiffest).bounds(), limits, need) if stiffest else None,
+        stiffest=bracket,
         frequencies=_frequencies(setup, slopes), map=_map(setup, need),
         best_frequencies=fisher.best(setup, slopes, need), advised_frequencies=fisher.advised(setup, need),
         changes=tuple(one.result() for one in helpful),
         changes_together=fisher.standard_errors(combined) if combined else None,
         calibrated=calibrated, uncalibrated=uncalibrated,
     )  # fmt: skip
-
-
-def _stiffest(stiff: LeastErrors, free: LeastErrors, need: Required) -> results.Stiffest:
-    return results.Stiffest(**vars(standard_errors(stiff)), verdict=fisher.bracket(free, stiff, need))
-
-
-def _press(setup: Setup) -> results.ReferencePress:
-    sensor = setup.sensor
-    stress = sensor.stress_pa(setup.force_n, setup.position_m)
-    strain = float(sensor.compression.capacitive_strain(stress)[0])
-    return results.ReferencePress(setup.force_n, setup.position_m, sensor.tip_m, float(stress), strain)
 
 
 def _on_a_bench(setup: Setup) -> tuple[results.StandardErrors | None, ...]:

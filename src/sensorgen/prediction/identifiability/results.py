@@ -395,7 +395,7 @@ def of_schema_1(data: dict[str, Any]) -> Identifiability | None:
     """The identifiability in a prediction of version 0.1.0; None where it had only a reason."""
     if not data.get("verdict"):
         return None
-    from pydantic import TypeAdapter
+    from sensorgen.core.records import adapter
 
     def summary(row: dict[str, Any]) -> dict[str, Any]:
         at = row.pop("worst_at", None) or {"force_n": None, "position_m": None}
@@ -405,7 +405,7 @@ def of_schema_1(data: dict[str, Any]) -> Identifiability | None:
         return row | {"frequency_hz": row["frequency_hz"] or ()}
 
     press, over, advised = data["press"], data["map"], data["advised_tones"]
-    return TypeAdapter(Identifiability).validate_python(
+    known: Identifiability = adapter(Identifiability).validate_python(
         data
         | {
             "press": press | {"strain": press["thinning"]},
@@ -415,3 +415,4 @@ def of_schema_1(data: dict[str, Any]) -> Identifiability | None:
             "advised_frequencies": advised | {name: choice(advised[name]) for name in ("single", "pair")},
         }
     )
+    return known

@@ -244,7 +244,7 @@ class Estimates(PressAnswers):
 
     def identified(self, *, prior: bool = False) -> "Estimates":
         """Estimates that are nan where the readings do not identify a quantity, unless a prior was stated."""
-        counts = np.array([[s.force_counts, s.position_counts] for s in Status])[self.status]
+        counts = self.status[:, None] <= np.array([Status.FORCE_ONLY, Status.AT_THE_END])  # force, position
         counts |= (prior & (self.status <= Status.NOT_IDENTIFIABLE))[:, None]
         force, position = np.where(counts, 1.0, np.nan).T[:, :, None]
         return replace(

@@ -112,12 +112,12 @@ class ResponseTable:
         self.scale = np.array([most_n, sensor.length_m])
         self.edges = _edges(sensor)
         force, position = (_thirds(edges) * scale for edges, scale in zip(self.edges, self.scale, strict=True))
-        values = parts(log_impedance(sensor, frequency_hz, *_pairs(force, position).T))
+        values = parts(log_impedance(sensor, frequency_hz, *pairs(force, position)))
         self.coefficients = _cubics(values.reshape(len(force), len(position), -1))
         self.shape = len(self.edges[0]) - 1, len(self.edges[1]) - 1
         forces, positions = ((edges[1:] + edges[:-1]) / 2 for edges in self.edges)
-        self.middles = _pairs(forces, positions)
-        self._seeds = _pairs(self.edges[0][1::2], positions)
+        self.middles = np.column_stack(pairs(forces, positions))
+        self._seeds = np.column_stack(pairs(self.edges[0][1::2], positions))
         local, reach = self.at(self._seeds), np.repeat(np.diff(self.edges[0][::2]), len(positions))
         self._origin = local.value.mean(0)
         off, along = (local.value - self._origin).T, local.slope[:, 0].T
@@ -208,9 +208,10 @@ def _edges(sensor: Sensor) -> tuple[Real, Real]:
     return np.linspace(0, 1, FORCE_CELLS + 1) ** _BEND, np.unique(np.concatenate(parts))
 
 
-def _pairs(forces: Real, positions: Real) -> Real:
-    """All pairs, (n, 2)."""
-    return np.stack(np.meshgrid(forces, positions, indexing="ij"), -1).reshape(-1, 2)
+def pairs(force: Real, position: Real) -> tuple[Real, Real]:
+    """Forces and positions of all points of a grid, along positions first."""
+    forces, positions = np.meshgrid(force, position, indexing="ij")
+    return forces.ravel(), positions.ravel()
 
 
 def _thirds(edges: Real) -> Real:

@@ -153,16 +153,6 @@ class Status(Worded):
     MISSING = 6, "missing"
     """Nothing was measured."""
 
-    @property
-    def force_counts(self) -> bool:
-        """True if the force may be used."""
-        return self <= Status.FORCE_ONLY
-
-    @property
-    def position_counts(self) -> bool:
-        """True if the position may be used."""
-        return self <= Status.AT_THE_END
-
 
 def covariance(fisher: Real) -> Real:
     """Inverse of the information (n, 2, 2); infinite variances where it is singular."""

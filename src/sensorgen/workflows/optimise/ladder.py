@@ -1,6 +1,5 @@
 """Knowledge of one design, the least expensive first: design rules, bounds at rest, a coarse mesh, everything."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
@@ -11,7 +10,6 @@ from sensorgen.checks.review import review
 from sensorgen.core import cache
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import SensorgenError
-from sensorgen.core.records import adapter
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
@@ -127,14 +125,13 @@ def everything(design: Design, query: Query, slicer: str) -> Trial:
     }
     question["waivers"] = [w.model_dump() for w in design.waivers]
 
-    def work() -> object:
+    def work() -> Trial:
         found = trial(design, query, slicer=slicer or NONE, drawn=False)
         if design.layout and found.status == "predicted":
             found = replace(found, printed=_of_array(design, query, slicer, found.printed))
-        return json.loads(adapter(Trial).dump_json(found))
+        return found
 
-    tried: Trial = adapter(Trial).validate_json(json.dumps(cache.answer(question, work)))
-    return tried
+    return cache.record(question, Trial, work)
 
 
 def _of_array(design: Design, query: Query, slicer: str, numbers: Numbers) -> Numbers:
