@@ -103,7 +103,7 @@ def test_an_error_of_the_model_no_longer_misleads(model, error):
 def test_intervals_hold_on_specimens_with_all_errors_at_once(model, scale):
     """Some of the specimens of bench/coverage.py, which has 200 of each kind."""
     shares = []
-    for seed in range(4):
+    for seed in range(3):
         truth = drawn(seed, scale)
         known, others = split(truth, 30, 200, seed)
         found = Inverter(model, calibrated(model, data(known, truth)), force_limit_n=LIMIT_N)

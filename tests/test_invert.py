@@ -107,7 +107,7 @@ def test_a_sensor_with_everything_comes_back():
 
 def test_it_is_the_least_squares_solution():
     sensor, tones = sensor_and_tones("5 ohm m, tones to 1 MHz")
-    force, position = presses(40, force=(1.0, 6.0), ends=0.015)
+    force, position = presses(15, force=(1.0, 6.0), ends=0.015)
     z = noisy(readings(sensor, tones, force, position))
     found = estimate(sensor, tones, z)
     for k in range(len(z)):
@@ -177,7 +177,7 @@ def test_noise_above_the_signal_says_nothing():
     assert np.mean(found.status == Status.NOT_IDENTIFIABLE) > 0.9  # the logarithm of such noise has a long tail: no fit
     assert (found.status >= Status.NOT_IDENTIFIABLE).mean() > 0.96
     assert not np.isnan(found.force_n).any()
-    known = estimate(sensor, tones, z[:150], 0.5, Prior())  # nothing is left but the prior
+    known = estimate(sensor, tones, z[:60], 0.5, Prior())  # nothing is left but the prior
     assert np.median(known.force_n) == pytest.approx(6.5, abs=1.0)
     assert np.median(known.position_m) == pytest.approx(0.05, abs=0.01)
     assert np.median(np.sqrt(known.covariance[:, 1, 1])) == pytest.approx(0.1 / math.sqrt(12), rel=0.15)
@@ -329,7 +329,7 @@ def test_blocks_do_not_show():
 def test_a_wide_posterior_is_better_than_least_squares():
     """Noise above signal: presses from the prior, so that the posterior mean has the least error that there is."""
     rng = np.random.default_rng(5)
-    force, position = rng.uniform(0, 6, 500), rng.uniform(0, 0.1, 500)
+    force, position = rng.uniform(0, 6, 300), rng.uniform(0, 0.1, 300)
     z = noisy(readings(PLATE, TONES, force, position), 3e-3)
     plain = Estimator(PLATE, TONES, 3e-3, force_limit_n=6.0).batch(z)
     known = Estimator(PLATE, TONES, 3e-3, Prior(), force_limit_n=6.0).batch(z)
@@ -343,7 +343,7 @@ def test_a_wide_posterior_is_better_than_least_squares():
     assert force_map < 1.02 * 6 / math.sqrt(12)  # a guess, the middle of the range
     assert position_map < 1.02 * 0.1 / math.sqrt(12)
     for interval, truth in ((known.force_90_n, force), (known.position_90_m, position)):
-        assert 0.87 < np.mean((interval[:, 0] < truth) & (truth < interval[:, 1])) < 0.93
+        assert 0.86 < np.mean((interval[:, 0] < truth) & (truth < interval[:, 1])) < 0.94
     assert np.mean(known.covariance[:, 0, 0]) == pytest.approx(force_map**2, rel=0.1)
 
 

@@ -164,15 +164,16 @@ def test_a_wide_range_names_the_measurement_that_narrows_it(tmp_path):
     assert "top electrode" not in {n.quantity for n in found.narrowing}
 
 
-def test_a_permittivity_changes_the_rise_of_gaps_too():
-    """Of tri with X60 as its sources have it, solved anew: 1.27 times the sensitivity at most."""
+def test_a_permittivity_changes_the_rise_of_gaps_too(monkeypatch):
+    """Of tri with X60 as its sources have it, solved anew: 1.27 times the sensitivity at most. Pressed by 6 N alone."""
     pytest.importorskip("netgen", reason="solves a cell: pip install sensorgen[fem]")
     design = make({"shape": "tri"})
     known = evaluate(bodies.drawn(design)).sensitivity
     (x60,) = (v for v in values.permittivities(design) if v.material == "x60")
+    monkeypatch.setattr(compression_law, "STRESS_PA", (0.0, 6e4, 1.2e5))
     for eps in spread(design, x60):
         other = make({"shape": "tri", "material_values": {"x60": {"relative_permittivity": eps}}})
-        value = evaluate(bodies.drawn(other), Query(law="solved")).sensitivity.value
+        value = evaluate(bodies.drawn(other), Query(law="solved"), keep=False).sensitivity.value
         assert known.material.lower <= value <= known.material.upper
     assert value > 1.2 * known.value
 
