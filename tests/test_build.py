@@ -122,17 +122,6 @@ def test_a_film_of_nothing_is_refused_unless_forced(name, tmp_path):
     assert "touch" in forced.prediction.drawn.reason
 
 
-@pytest.mark.parametrize("printer", ["diabase-h5", "prusa-xl5"])
-def test_nothing_is_wired_to_one_printer(printer, tmp_path, unpredicted):
-    data = {"shape": "rect", "parameters": {"length_mm": 6.0, "width_mm": 6.0}, "materials": {"support": "bvoh"}}
-    variant = design.make({**data, "printer": printer})
-    built = build(variant, tmp_path, cad=False)
-    config = (built.folder / f"{variant.name}.prusa.3mf").exists()
-    assert config
-    names = {p.name for p in (built.folder / "profiles" / "prusa").iterdir()}
-    assert names == {f"{printer}-fine.ini", f"{printer}-extrafine.ini"}
-
-
 @pytest.mark.parametrize("shape", registry.names(shapes))
 def test_all_listed_shapes_build(shape, tmp_path, unpredicted):
     """Two periods each way; forced, as so few bumps and cones leave bridges at the edge, which larger ones do not."""

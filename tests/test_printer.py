@@ -46,10 +46,12 @@ def test_heights_of_tools_are_given_in_a_file(own):
     [
         ("spindles: []", 'tool_offsets_mm: {"9": 0.1}', "tool 9 under control is not among"),
         ("spindles: []", 'tool_offsets_mm: {"a": 0.1}', "expected a whole number"),
-        ("nozzle_mm: 0.4", "nozzle_mm: -0.4", "nozzle_mm"),
         ("nozzle_mm: 0.4", "nozzle_mm: .nan", "nozzle_mm"),
+        ("nozzle_mm: 0.4", "nozzle_mm: 0", "nozzle_mm is 0; expected a number above 0"),
+        ("nozzle_mm: 0.4", "nozzle_mm: 0.4\ncolour: red", "unknown key 'colour'"),
         ("nozzle_mm: 0.4", "nozle_mm: 0.4", "nozle_mm|nozzle_mm"),
-        ("bed_mm: [390.0, 170.0]", "bed_mm: [390.0]", "bed_mm"),
+        ("\nsource:", '\nsource: "two\\nlines" #', "without control characters"),
+        ("tool_numbers: [1, 2, 3, 4, 5]", "tool_numbers: [3, 3, 4, 5]", "has a number twice"),
         ("bed_mm: [390.0, 170.0]", "bed_mm: [.inf, 170.0]", "bed_mm"),
         ("tool_numbers: [1, 2, 3, 4, 5]", "tool_numbers: []", "tool_numbers"),
         ("etpu: 3", "etpu: 9", "default tool 9 for etpu is not among"),
@@ -58,7 +60,7 @@ def test_heights_of_tools_are_given_in_a_file(own):
     ],
 )
 def test_a_faulty_printer_file_is_named_with_its_key(own, old, new, key):
-    with pytest.raises(BadInput, match=f"own.yaml: .*({key})"):
+    with pytest.raises(BadInput, match=f"^/.*own.yaml: .*({key})"):
         printer.load_printer(own(old, new))
 
 
@@ -66,28 +68,6 @@ def test_a_faulty_printer_file_is_named_with_its_key(own, old, new, key):
 def test_unknown_names(load, word):
     with pytest.raises(UnknownName, match=f"unknown {word} 'fyne'"):
         load("fyne")
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ("tool_numbers: [3, 3, 4, 5]", "has a number twice"),
-        ('title: "two\\nlines"', "without control characters"),
-        ("colour: red", "unknown key 'colour'"),
-        ("nozzle_mm: 0", "nozzle_mm is 0; expected a number above 0"),
-        ("default_tools: {etpu: 9}", "not among"),
-    ],
-)
-def test_a_bad_printer_file_is_told_in_our_words(tmp_path, change, said):
-    text = (packs.profiles() / "printers/diabase-h5.yaml").read_text("utf-8")
-    key = change.partition(":")[0]
-    path = tmp_path / "own.yaml"
-    path.write_text(
-        "\n".join(line for line in text.splitlines() if not line.startswith(key)) + f"\n{change}\n", "utf-8"
-    )
-    with pytest.raises(BadInput, match=said) as caught:
-        printer.load_printer(str(path))
-    assert str(caught.value).startswith(str(path))
 
 
 @pytest.mark.parametrize(

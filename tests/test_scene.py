@@ -114,14 +114,6 @@ def test_half_a_turn_about_x_keeps_x_and_turns_y_and_z(axis):
     assert area_mm2(turned.outline) == area_mm2(prism.outline)
 
 
-def test_upside_down_the_top_electrode_lies_on_the_bed():
-    scene = tri.scene(tri.Params(length_mm=7.13, width_mm=3.3), Fill()).turned_over()
-    (comb,) = scene.body("top_electrode_with_cogs").pieces
-    assert comb.span("z") == (0.0, 0.8)  # 0.3 plate and 0.5 cog
-    assert comb.span("x") == (0.0, 7.13)
-    assert all(area_mm2(p.outline) > 0 for body in scene.bodies for p in body.pieces)
-
-
 def test_triy_is_trix_with_length_and_width_exchanged():
     along_x = tri.scene(tri.Params(length_mm=7.13, width_mm=3.3, along="x"), SUPPORTED)
     along_y = tri.scene(tri.Params(length_mm=3.3, width_mm=7.13, along="y"), SUPPORTED)
@@ -167,12 +159,6 @@ def test_a_prism_is_cut_as_by_hand(prism, axis, at, expected):
     assert len(got) == len(expected)
     for a, b in zip(got, expected, strict=True):
         assert np.array(a) == pytest.approx(np.array(b), abs=1e-15)
-
-
-def test_a_sawtooth_is_cut_into_its_teeth():
-    teeth = Prism("y", ((0, 0), (4, 0), (3, 1), (2, 0.2), (1, 1)), 0.0, 1.0)
-    assert [o[0][0] for o in teeth.cut("z", 0.6)] == pytest.approx([0.6, 2.5])
-    assert [o[1][0] for o in teeth.cut("z", 0.6)] == pytest.approx([1.5, 3.4])
 
 
 @pytest.mark.parametrize("axis", "xyz")

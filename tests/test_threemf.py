@@ -143,12 +143,6 @@ class TestEveryFamily:
         assert root.get("unit") == "millimeter"
         assert {m.get("name"): m.text for m in root.findall(f"{CORE}metadata")}["Title"] == TITLE
 
-    def test_every_file_has_a_kind(self, family):
-        # Open Packaging Conventions: a file without a content type makes the package invalid.
-        files = unzipped(content(family, TITLE, parts(), (0, 0)))
-        known = {kind.get("Extension") for kind in ET.fromstring(files["[Content_Types].xml"])}
-        assert {name.rpartition(".")[2] for name in files} - {"xml"} <= known
-
     def test_coordinates_are_finer_than_float32(self, family):
         mesh = box((0, 0, 0), (1, 1, 1))
         mesh = Mesh(mesh.vertices_mm * 99 + np.random.default_rng(4).random((8, 3)), mesh.triangles)

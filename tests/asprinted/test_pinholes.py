@@ -129,11 +129,6 @@ def test_films_of_more_layers_are_left_out_where_asked():
     assert pinholes(design, paths.read(text, design.machine), most_layers=1).rows == ()
 
 
-def test_draws_repeat_and_differ():
-    two = film(lines(0.5, 0.47), lines(0.5, 0.47, along_x=False))
-    assert draws(two, 3).tolist() == draws(two, 3).tolist()
-
-
 def joined(sign, inset_mm=0.3):
     """A layer of a wall and of infill at 45 degrees that ends on it: lines 0.4 mm wide."""
     wall, inner = shapely.box(0.2, 0.2, 9.8, 9.8), shapely.box(inset_mm, inset_mm, 10 - inset_mm, 10 - inset_mm)

@@ -21,13 +21,10 @@ def strip(width_mm: float, axis: str = "x") -> Body:
 
 
 BANDS = [
-    (0.05, "error", "vanishes", 0.12),
     (0.12 - HAIR, "error", "vanishes", 0.12),
     (0.12, "error", "vanishes", 0.12),
     (0.12 + HAIR, "warning", "prints 0.34 mm wide", 0.34),
-    (0.34, "warning", "prints 0.34 mm wide", 0.34),
     (0.34 + HAIR, "warning", "narrower than a line", 0.44),
-    (0.44 - HAIR, "warning", "narrower than a line", 0.44),
     (0.44, "info", "1.2 to 1.8 times its material", 0.70),  # a whole line prints
     (0.70, "info", "1.2 to 1.8 times its material", 0.70),  # sqXY's strips: deposited 1.24 times (as-printed.md)
 ]
@@ -105,14 +102,13 @@ def test_a_tip_that_runs_out_is_a_warning(sensor, findings):
     assert "a stretch 0.5 to 0.7 mm wide" in found[2].message
 
 
-@pytest.mark.parametrize("height", [0.5, 0.51, 0.53, 0.549, 0.55, 0.56, 0.59])
+@pytest.mark.parametrize("height", [0.5, 0.53, 0.549, 0.59])
 def test_a_tip_is_a_tip_wherever_it_ends_in_the_layer(sensor, findings, height):
     """Also where its last hundredths miss their own sample and the layer before them is too narrow."""
     assert [f for f in findings(sensor(spike(height * 2, height)), "5-", "strip") if f.severity == "error"] == []
 
 
-@pytest.mark.parametrize("film_mm", [0.1, 0.15, 0.2])
-@pytest.mark.parametrize("quality", ["fine", "extrafine"])
+@pytest.mark.parametrize(("quality", "film_mm"), [("fine", 0.1), ("fine", 0.15), ("extrafine", 0.2)])
 def test_tips_of_triangles_cut_at_the_edge_are_tips_too(findings, request, quality, film_mm):
     """Half triangles at x = 0 taper to one side."""
     scene = tri.scene(tri.Params(length_mm=8.0, width_mm=4.0, dielectric_mm=film_mm), Fill())

@@ -80,10 +80,6 @@ def test_one_layer_up_is_near_and_two_are_neither():
     assert sums(COMB + [line.format(0.3) for line in up]) == {}
 
 
-def test_what_is_printed_later_does_not_count():
-    assert sums(["M83", "T4", "G1 Z0.1", *OVER[4:], "G1 Y15", "G1 X-5 Y15", "T3", *COMB[5:]]) == {}
-
-
 def test_an_own_line_on_top_hides_the_other_material():
     own = ["G1 X25", "G1 Y-3", "T4", "G1 Z0.2", "G1 X10 Y-1", f"G1 Y10 {e(11, 1.0)}", "G1 X10 Y12"]
     assert sums(COMB + own + OVER[5:]) == {}
@@ -93,11 +89,6 @@ def test_an_own_line_on_top_hides_the_other_material():
 def test_tower_and_skirt_are_nobodys_material():
     assert sums([*COMB[:6], ";TYPE:Wipe tower", *COMB[6:], *OVER]) == {}
     assert sums([*COMB[:6], ";TYPE:SKIRT", *COMB[6:], *OVER]) == {}
-
-
-def test_a_travel_without_retraction_is_counted_as_such():
-    bare = [line for line in OVER if "E-" not in line and "E3" not in line]
-    assert drags(COMB + bare, DIABASE).tools[0].unretracted == 1
 
 
 def test_the_nozzles_face_rubs_on_what_is_beside_a_line():

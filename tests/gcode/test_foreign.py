@@ -109,17 +109,16 @@ def test_a_marlin_file_is_refused_for_what_it_is():
 
 
 def test_a_file_of_something_else_is_told_in_few_lines():
-    found = check([f"X{n} marks the spot" for n in range(500)], DIABASE).findings
+    found = check([f"X{n} marks the spot" for n in range(300)], DIABASE).findings
     assert len(found) < 30
-    assert any(f.message.startswith("further lines cannot be read") and f.count > 400 for f in found)
+    assert any(f.message.startswith("further lines cannot be read") and f.count > 200 for f in found)
 
 
-@pytest.mark.parametrize("text", [LAB, MARLIN])
 @pytest.mark.parametrize("end", ["\r\n", "\r", "\n\n"])
-def test_ends_of_lines_change_nothing(text, end, tmp_path):
+def test_ends_of_lines_change_nothing(end, tmp_path):
     path = tmp_path / "a.gcode"
-    path.write_bytes(end.join(text.splitlines()).encode())
-    one, other = check(path, DIABASE), check(text.splitlines(), DIABASE)
+    path.write_bytes(end.join(LAB.splitlines()).encode())
+    one, other = check(path, DIABASE), check(LAB.splitlines(), DIABASE)
     assert one.tools == other.tools
     assert [(f.rule, f.message) for f in one.findings] == [(f.rule, f.message) for f in other.findings]
 
@@ -158,7 +157,7 @@ WORDS = st.one_of(
 LINES = st.lists(st.lists(WORDS, max_size=6).map(" ".join), max_size=25)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(LINES)
 @example(["G91", "G1 X1e38", "G1 X1e38", "G20", "G1 X9" + "9" * 350, "G1 X-9" + "9" * 350, "M83", "G1 E9" + "9" * 350])
 @example(["M83", "G2 X1 Y1 I1e300 J1e300", "G3 R1e300 X5", "G2 I0.00001", "G3 X5 Y5 R-0.0001", "G2 I1e200 J1e200 X1"])
@@ -180,7 +179,7 @@ def test_anything_is_followed_without_a_traceback(lines):
     assert made.endswith(b"\n") or not made
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.binary(max_size=400), st.sampled_from([b"", b"G28\n", OWN.encode()]))
 def test_any_bytes_are_read_or_refused(tmp_path_factory, content, head):
     path = tmp_path_factory.getbasetemp() / "any.gcode"

@@ -120,7 +120,7 @@ def test_a_zip_bomb_is_not_unpacked(tmp_path, monkeypatch):
         mesh_files.read_3mf(path)
 
 
-@pytest.mark.parametrize("data", [b"", b"PK\x03\x04", b"solid", bytes(84), b"\x00" * 100, b"solid a\nvertex 1 2"])
+@pytest.mark.parametrize("data", [b"", b"PK\x03\x04", bytes(84), b"solid a\nvertex 1 2"])
 def test_files_that_are_none_are_refused(tmp_path, data):
     for name, read in (("a.3mf", mesh_files.read_3mf), ("a.stl", lambda path: mesh_files.read_stl(path, "mm"))):
         path = tmp_path / name

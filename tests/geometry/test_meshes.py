@@ -9,7 +9,7 @@ import trimesh
 
 from sensorgen.design.shapes import rect, reference, tri
 from sensorgen.scene.geometry.meshes import Mesh, mesh
-from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
+from sensorgen.scene.scene import Body, Fill, Prism, box
 
 
 def second_program(made: Mesh) -> trimesh.Trimesh:
@@ -37,28 +37,21 @@ def cubes(*corners: tuple[int, int, int]) -> Body:
 
 ODD = {"length_mm": 7.13, "width_mm": 3.3, "electrode_mm": 0.31, "isolation_mm": 0.07}
 VARIANTS = [
-    (tri, {}),
     (tri, ODD | {"along": "y"}),
     (tri, ODD | {"period_mm": 0.7, "hang_height_mm": 1.3, "lower_height_mm": 0.01, "dielectric_mm": 1e-6}),
     (tri, {"length_mm": 1.001, "dielectric_mm": 0.0}),
-    (rect, {"length_mm": 11.0}),
     (rect, ODD | {"along": "yx", "etpu_width_mm": 0.13, "air_width_mm": 0.29, "dielectric_mm": 0.0}),
     (reference, ODD),
 ]
 
 
 @pytest.mark.parametrize(("shape", "options"), VARIANTS)
-@pytest.mark.parametrize("change", ["as drawn", "upside down", "stretched"])
-def test_every_body_is_a_solid_of_its_closed_form_volume(shape, options, change):
+def test_every_body_is_a_solid_of_its_closed_form_volume(shape, options):
     """The bodies' own volumes are held against closed forms in test_scene.py and properties/test_bodies.py."""
     scene = shape.scene(shape.Params(**options), Fill(support="bvoh", film="pla"))
-    changed: dict[str, Scene] = {
-        "as drawn": scene,
-        "upside down": scene.turned_over(),
-        "stretched": scene.stretched(1 / (1 - 0.2)),
-    }
-    for body in changed[change].bodies:
-        assert_solid(mesh(body), body.volume_mm3())
+    for changed in (scene, scene.turned_over(), scene.stretched(1 / (1 - 0.2))):
+        for body in changed.bodies:
+            assert_solid(mesh(body), body.volume_mm3())
 
 
 @pytest.mark.parametrize("axis", "xyz")
@@ -116,7 +109,3 @@ def test_crossed_strips_are_one_shell_and_separate_strips_are_many():
     scene = rect.scene(rect.Params(length_mm=8.0, width_mm=4.0), Fill())
     assert second_program(mesh(scene.body("top_electrode_with_cogs"))).body_count == 1
     assert second_program(mesh(scene.body("hanging_dielectric"))).body_count == 2  # one per period over the width
-
-
-def test_an_empty_mesh_has_no_volume():
-    assert Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)).volume_mm3() == 0.0

@@ -106,9 +106,8 @@ def test_without_a_film_everything_is_valid_but_the_gap(shape):
     assert electrode_gap_mm(scene, made(scene)) == 0.0
 
 
-@pytest.mark.parametrize("film_mm", [1e-6, 1e-3, 0.1, 0.2, 1.7])
+@pytest.mark.parametrize(("film_mm", "turned"), [(1e-6, False), (0.2, True)])
 @pytest.mark.parametrize("shape", [tri, rect, reference])
-@pytest.mark.parametrize("turned", [False, True])
 def test_the_gap_is_the_film(shape, film_mm, turned):
     scene = shape.scene(shape.Params(length_mm=4.5, width_mm=3.3, dielectric_mm=film_mm), Fill())
     scene = scene.turned_over() if turned else scene

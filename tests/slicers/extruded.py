@@ -18,20 +18,13 @@ class Extruded:
     tools: tuple[int, ...]
     volume_mm3: dict[tuple[int, str], float]
 
-    def total_mm3(self) -> dict[int, float]:
-        """Volume that each tool extrudes, tower and skirt included [mm3]."""
-        return self._sum(self.volume_mm3)
-
     def model_mm3(self) -> dict[int, float]:
         """Volume that each tool extrudes for the bodies alone [mm3]."""
-        return self._sum({key: v for key, v in self.volume_mm3.items() if key[1] not in NOT_MODEL})
-
-    @staticmethod
-    def _sum(parts: dict[tuple[int, str], float]) -> dict[int, float]:
         sums: defaultdict[int, float] = defaultdict(float)
-        for (tool, _), volume in parts.items():
-            sums[tool] += volume
-        return {tool: sums[tool] for tool in sorted(sums)}
+        for (tool, kind), volume in sorted(self.volume_mm3.items()):
+            if kind not in NOT_MODEL:
+                sums[tool] += volume
+        return dict(sums)
 
 
 def read(source: Source, filament_mm: float) -> Extruded:
@@ -55,7 +48,7 @@ def read(source: Source, filament_mm: float) -> Extruded:
     Examples
     --------
     >>> found = read(["M83", "T1", "G1 X9 E2", "G1 E-1", "T0", "T1", "G1 E1", "G1 X0 E0.5"], filament_mm=2.0)
-    >>> found.tools, round(found.total_mm3()[1] / math.pi, 6)
+    >>> found.tools, round(found.model_mm3()[1] / math.pi, 6)
     ((1, 0, 1), 2.5)
     """
     motion = follow(source)

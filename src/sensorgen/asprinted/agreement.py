@@ -146,12 +146,6 @@ def _waste(paths: Paths) -> Mask:
     return np.asarray(np.array([kind in NOT_MODEL for kind in paths.kinds])[paths.kind])
 
 
-def _line(number: Whole, rows: Mask) -> tuple[int, int]:
-    """First line of the file among some rows, and how many there are."""
-    lines = np.unique(number[rows])
-    return int(lines[0]), len(lines)
-
-
 def _heights(design: Design, paths: Paths, piece: Mask) -> Iterator[GcodeFinding]:
     """The first layer is as high as the design's, and every line lies in a layer, in order."""
     tops = np.array(design.layers.boundaries_mm(design.printed.size_mm[2]))[1:]
@@ -159,26 +153,23 @@ def _heights(design: Design, paths: Paths, piece: Mask) -> Iterator[GcodeFinding
     z = paths.end_mm[:, 2]
     lowest = float(z[piece].min())
     if abs(lowest - first_mm) > LEVEL_MM:
-        number, count = _line(paths.number, piece & (z == lowest))
         message = f"the lowest line lies at Z {lowest:g} mm; the first layer of {design.name} is {first_mm:g} mm"
-        yield GcodeFinding(
-            "first-layer", "error", number, message, "set the first layer's height, and no offset of Z", count
-        )
+        lines, advice = paths.number[piece & (z == lowest)], "set the first layer's height, and no offset of Z"
+        yield GcodeFinding.of("first-layer", lines, message, advice)
     near = np.searchsorted((tops[1:] + tops[:-1]) / 2, z)  # the layer whose top is nearest
     slanted = np.abs(paths.start_mm[:, 2] - z) > LEVEL_MM
     between = piece & ((np.abs(z - tops[near]) > LEVEL_MM) | slanted)
     if between.any():
-        number, count = _line(paths.number, between)
         worst = float(z[between][0])
         message = (
             f"lines at Z {worst:g} mm lie in no layer of {design.name}: {first_mm:g} mm, then every {layer_mm:g} mm"
         )
-        yield GcodeFinding("layers", "error", number, message, "slice with this design's layers", count)
+        yield GcodeFinding.of("layers", paths.number[between], message, "slice with this design's layers")
     order = near[piece & ~between]
     if (np.diff(order) < 0).any():
         back = paths.number[piece & ~between][1:][np.diff(order) < 0]
         message = f"a layer of {design.name} is printed after one that lies higher"
-        yield GcodeFinding("layers", "error", int(back[0]), message, "print layer by layer", len(back))
+        yield GcodeFinding.of("layers", back, message, "print layer by layer")
     yield from _missing(design, paths, piece & ~between, near, tops)
 
 
@@ -245,14 +236,12 @@ def _widths(design: Design, lines: Beads) -> Iterator[GcodeFinding]:
         (thin, "thin", np.min),
     ):
         if wrong.any():
-            number, count = _line(lines.number, wrong)
             width = float(worst(lines.width_mm[wrong]))
             message = (
                 f"a line is {width:.2g} mm {what}; lines of a {design.machine.nozzle_mm:g} mm nozzle are {line:g} mm"
             )
-            yield GcodeFinding(
-                "width", "error", number, message, "check E, the filament's diameter and the flow", count
-            )
+            advice = "check E, the filament's diameter and the flow"
+            yield GcodeFinding.of("width", lines.number[wrong], message, advice)
 
 
 def _purged(design: Design, paths: Paths, changes: Sequence[ToolChange], piece: Mask) -> Iterator[GcodeFinding]:
@@ -298,10 +287,9 @@ def _floating(design: Design, paths: Paths, outside: Mask) -> Iterator[GcodeFind
     jumps = np.cumsum(rise > MOST_LAYERS * layer_mm)
     air = jumps > np.maximum.accumulate(np.where(starts, jumps - (rise > MOST_LAYERS * layer_mm), 0))
     if paths.length_mm()[rows[air]].sum() > design.machine.line_mm():
-        row = int(rows[air][0])
-        x, y = paths.end_mm[row, :2]
+        x, y = paths.end_mm[rows[air][0], :2]
         message = f"lines are printed in air at x {x:.4g}, y {y:.4g} mm on the bed, beside the sensor"
-        yield GcodeFinding("clear", "error", int(paths.number[row]), message, "leave them out", int(air.sum()))
+        yield GcodeFinding.of("clear", paths.number[rows[air]], message, "leave them out")
 
 
 def _beside(
@@ -315,13 +303,11 @@ def _beside(
     ways = shapely.linestrings(np.stack([ends[0][rows], ends[1][rows]], axis=1))
     near[rows] = shapely.intersects(ways, plan)
     if near.any():
-        number, count = _line(paths.number, near)
         kinds = ", ".join(sorted({paths.kinds[kind] for kind in paths.kind[near].tolist()}))
-        yield GcodeFinding(
-            "clear", "error", number, f"lines of {kinds} cross the sensor", "move them away from it", count
-        )
+        message = f"lines of {kinds} cross the sensor"
+        yield GcodeFinding.of("clear", paths.number[near], message, "move them away from it")
     if stray.any():
-        number, count = _line(paths.number, stray)
         x, y = paths.end_mm[stray][0, :2]
         message = f"lines that belong to no body are printed at x {x:g}, y {y:g} mm on the bed"
-        yield GcodeFinding("clear", "error", number, message, "leave them out, or print them as skirt or tower", count)
+        advice = "leave them out, or print them as skirt or tower"
+        yield GcodeFinding.of("clear", paths.number[stray], message, advice)

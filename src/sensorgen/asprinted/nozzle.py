@@ -55,8 +55,7 @@ def check(design: Design, motion: Motion, lines: Beads) -> Iterator[GcodeFinding
         Of the piece.
     """
     tool = tools_of(motion, design.machine)
-    printing = (motion.extruded_mm > 0) & (motion.across_mm > 0)
-    piece = printing & np.isin(motion.number, lines.number)
+    piece = motion.prints & np.isin(motion.number, lines.number)
     if not piece.any() or not set(lines.tool.tolist()) <= set(tool[piece].tolist()):
         return  # a slicer's own file, which is refused as such
     layer = np.zeros(len(tool), np.int64)
@@ -66,19 +65,13 @@ def check(design: Design, motion: Motion, lines: Beads) -> Iterator[GcodeFinding
         mine = design.tool(material)
         yield from _balance(design, motion, tool == mine, piece, mine, material)
         yield from _fan(design, motion, piece & (tool == mine) & (layer >= _FAN_FROM), mine, material)
-    yield from _dwell(motion, design, printing, piece)
+    yield from _dwell(motion, design, piece)
     fast = piece & (layer == 0) & (motion.feed_mm_min > 60 * FIRST_LAYER_MM_S * (1 + 1e-6))
     if fast.any():
         speed = float(motion.feed_mm_min[fast].max()) / 60
         message = f"the first layer is printed at {speed:g} mm/s; at most {FIRST_LAYER_MM_S:g} mm/s adhere"
-        yield GcodeFinding(
-            "speed", "error", _first(motion, fast), message, "print the first layer slower", int(fast.sum())
-        )
+        yield GcodeFinding.of("speed", motion.number[fast], message, "print the first layer slower")
     yield from _drags(design, motion, tool, piece)
-
-
-def _first(motion: Motion, rows: Mask | Whole) -> int:
-    return int(motion.number[rows][0])
 
 
 def _value(design: Design, material: str, quantity: str) -> float | None:
@@ -104,7 +97,7 @@ def _balance(
     """Melt in the nozzle where a line begins is that where the one before it ended."""
     usual_mm = _value(design, material, "retraction_mm")
     at = np.cumsum(np.where(mine, _still(motion, usual_mm or 1.0), 0.0))
-    lines = np.flatnonzero(mine & (motion.extruded_mm > 0) & (motion.across_mm > 0))
+    lines = np.flatnonzero(mine & motion.prints)
     primed = [change.row for change in motion.changes if change.macro]  # by a macro of which nothing is known
     known = np.searchsorted(primed, lines) == np.searchsorted(primed, np.append(0, lines[:-1]))
     off = np.diff(at[lines], prepend=0.0)
@@ -118,13 +111,13 @@ def _balance(
         what = "more" if worst > 0 else "less"
         message = f"{abs(worst):.2g} mm of filament {what} are pushed than drawn back before a line of tool {tool}"
         advice = f"balance retraction and prime of each travel within {BALANCE_MM:g} mm"
-        yield GcodeFinding("melt", "error", _first(motion, here[wrong]), message, advice, int(wrong.sum()))
+        yield GcodeFinding.of("melt", motion.number[here[wrong]], message, advice)
     in_lines, total = float(motion.extruded_mm[here].sum()), float(mine_off[~wrong].sum())
     if not -_LOSS * in_lines <= total <= _GAIN * in_lines:
         message = (
             f"tool {tool}: primes exceed retractions by {total:.3g} mm of filament; its lines have {in_lines:.3g} mm"
         )
-        yield GcodeFinding("melt", "error", _first(motion, here), message, "prime as much as is drawn back")
+        yield GcodeFinding.of("melt", motion.number[here[:1]], message, "prime as much as is drawn back")
     if usual_mm:
         yield from _retraction(design, motion, mine, tool, usual_mm)
 
@@ -142,7 +135,7 @@ def _retraction(design: Design, motion: Motion, mine: Mask, tool: int, usual_mm:
         how_mm = 0.0 if never else length_mm
         message = f"tool {tool} draws {how_mm:g} mm back before travels; its material needs {usual_mm:g} mm"
         advice = f"retract {least:.2g} to {most:.2g} mm"
-        yield GcodeFinding("melt", "error", _first(motion, rows), message, advice, int(rows.sum()))
+        yield GcodeFinding.of("melt", motion.number[rows], message, advice)
 
 
 def _fan(design: Design, motion: Motion, rows: Mask, tool: int, material: str) -> Iterator[GcodeFinding]:
@@ -161,12 +154,12 @@ def _fan(design: Design, motion: Motion, rows: Mask, tool: int, material: str) -
             f"tool {tool} prints {material} with the fan at {level[wrong].min():.0f} %; its sources advise {least:g} %"
         )
         advice = f"switch the fan on (M106 P{fan} S255)"
-        yield GcodeFinding("fan", "error", _first(motion, wrong), message, advice, int(wrong.sum()))
+        yield GcodeFinding.of("fan", motion.number[wrong], message, advice)
 
 
-def _dwell(motion: Motion, design: Design, printing: Mask, piece: Mask) -> Iterator[GcodeFinding]:
+def _dwell(motion: Motion, design: Design, piece: Mask) -> Iterator[GcodeFinding]:
     """The nozzle never stands long, and hardly on the part."""
-    rows = np.flatnonzero(printing)
+    rows = np.flatnonzero(motion.prints)
     if not len(rows):
         return
     took = seconds(motion, design.machine.max_speed_mm_s)
@@ -212,8 +205,7 @@ def _drags(design: Design, motion: Motion, tool: Whole, piece: Mask) -> Iterator
                 f"tool {one} travels {dragged_mm:.0f} mm unretracted in contact with what other tools have printed"
             )
             advice = f"retract or lift; at most {most_mm:.0f} mm"
-            rows = np.unique(found.row[mine])
-            yield GcodeFinding("drag", "error", _first(motion, rows), message, advice, len(rows))
+            yield GcodeFinding.of("drag", motion.number[found.row[mine]], message, advice)
 
 
 @dataclass(frozen=True)

@@ -357,7 +357,7 @@ class _Simulation:
         self.motion, self.machine, self.control, self.findings = motion, machine, machine.control, Findings()
         self.pushes = np.flatnonzero(motion.filament_mm != 0)
         self.prints = np.flatnonzero(motion.extruded_mm > 0)
-        self.lines = np.flatnonzero((motion.extruded_mm > 0) & (motion.across_mm > 0))
+        self.lines = np.flatnonzero(motion.prints)
         self.travels = np.flatnonzero(motion.length_mm > 0)
         self.changes = {change.number: change for change in motion.changes}
         start = machine.tool_at_start()

@@ -24,6 +24,7 @@ from sensorgen.export.gcode.motion import Numbering, follow, paths_of, tools_of
 from sensorgen.export.gcode.moves import Motion, seconds
 from sensorgen.export.gcode.reading import Source, text_of
 from sensorgen.export.gcode.results import COUNTED_MM, FACE_MM, LIFT_MM, NEAR_MM, Drags, Lifting, OfLayer, ToolTravel
+from sensorgen.export.gcode.words import word
 
 CONTACT_MM = 0.03  # a nozzle within this above a line touches it: less than the thinnest layer
 PITCH_MM = 0.05  # between the points of a travel that are looked at
@@ -557,14 +558,14 @@ class _Lifts:
         z_feed, feed = 60 * self.machine.max_speed_mm_s.z, self.motion.feed_mm_min
         length, speed = self.habits.get(self.tools[first], (0.0, 0.0))
         draws = self._draws(first, last)
-        up = [f"G1 E-{_short(length)} F{_short(speed)}"] if draws else []
-        up.append(f"G1 Z{_short(high)} F{_short(z_feed)}")
+        up = [f"G1 {word('E', -length)} {word('F', speed)}"] if draws else []
+        up.append(f"G1 {word('Z', high)} {word('F', z_feed)}")
         if not self._has_feed(numbers[0]):
-            up.append(f"G1 F{_short(feed[first])}")
-        down = [f"G1 Z{_short(self.motion.rows[last, 5])} F{_short(z_feed)}"]
-        down += [f"G1 E{_short(length)} F{_short(speed)}"] if draws else []
+            up.append(f"G1 {word('F', feed[first])}")
+        down = [f"G1 {word('Z', self.motion.rows[last, 5])} {word('F', z_feed)}"]
+        down += [f"G1 {word('E', length)} {word('F', speed)}"] if draws else []
         if last + 1 < len(self.number) and not self._has_feed(int(self.number[last + 1])):
-            down.append(f"G1 F{_short(feed[last])}")
+            down.append(f"G1 {word('F', feed[last])}")
         for number in numbers:
             code, semicolon, remark = self.lines[number - 1].partition(b";")
             self.lines[number - 1] = _Z.sub(b"", code) + semicolon + remark
@@ -579,8 +580,3 @@ class _Lifts:
 
     def _has_feed(self, number: int) -> bool:
         return b"F" in self.lines[number - 1].partition(b";")[0].upper()
-
-
-def _short(value: float) -> str:
-    """A number of G-code, with what it needs of four decimals."""
-    return f"{value:.4f}".rstrip("0").rstrip(".")

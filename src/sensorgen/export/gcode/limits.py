@@ -187,9 +187,9 @@ def check_loaded(
             message = f"tool {tool} prints, and nothing is on it; loaded are {known}"
             rows = (tools == tool) & (motion.extruded_mm > 0)
             yield GcodeFinding("tool", "error", int(motion.number[rows][0]), message, "use another tool")
-    lines = (motion.extruded_mm > 0) & (motion.across_mm > 0)
-    area_mm2 = motion.extruded_mm * (math.pi / 4 * machine.filament_mm**2) / np.where(lines, motion.length_mm, 1.0)
-    flow_mm3_s = np.where(lines, area_mm2 * motion.feed_mm_min / MM_MIN, 0.0)
+    area_mm2 = motion.extruded_mm * (math.pi / 4 * machine.filament_mm**2)
+    area_mm2 /= np.where(motion.prints, motion.length_mm, 1.0)
+    flow_mm3_s = np.where(motion.prints, area_mm2 * motion.feed_mm_min / MM_MIN, 0.0)
     for tool, material in loaded.items():
         most = material.print_range("max_flow_mm3_s", 0.0)[1]
         wrong = (tools == tool) & (flow_mm3_s > most * (1 + 1e-6))
@@ -204,8 +204,7 @@ def check_loaded(
 def _found(motion: Motion, wrong: Mask, rule: str, severity: str, message: str, advice: str) -> Iterator[GcodeFinding]:
     """A finding if any move is wrong."""
     if wrong.any():
-        numbers = np.unique(motion.rows[wrong, 9])
-        yield GcodeFinding(rule, severity, int(numbers[0]), message, advice, len(numbers))
+        yield GcodeFinding.of(rule, motion.number[wrong], message, advice, severity)
 
 
 def _reach(motion: Motion, machine: Printer) -> Iterator[GcodeFinding]:
@@ -225,18 +224,17 @@ def _reach(motion: Motion, machine: Printer) -> Iterator[GcodeFinding]:
 
 def _bed(motion: Motion, machine: Printer) -> Iterator[GcodeFinding]:
     """Nothing is printed beside the bed or above the print volume."""
-    prints = (motion.extruded_mm > 0) & (motion.across_mm > 0)
     middle = np.array(machine.bed_centre_mm())
     low, high = (box[:, :2] for box in motion.box_mm())
     beside = np.maximum(high - middle, middle - low) - np.array(machine.bed_mm) / 2
-    wrong = prints & (beside > HAIR_MM).any(axis=1)
+    wrong = motion.prints & (beside > HAIR_MM).any(axis=1)
     far = float(beside[wrong].max()) if wrong.any() else 0.0
     wide, deep = machine.bed_mm
     yield from _found(
         motion, wrong, "bed", "error", f"lines are printed up to {far:.3g} mm beside the bed of {wide:g} x {deep:g} mm",
         "place the print on the bed",
     )  # fmt: skip
-    above = prints & (motion.end_mm[:, 2] > machine.height_mm + HAIR_MM)
+    above = motion.prints & (motion.end_mm[:, 2] > machine.height_mm + HAIR_MM)
     yield from _found(
         motion, above, "bed", "error", f"lines are printed above {machine.height_mm:g} mm",
         "print a lower piece",
@@ -246,9 +244,8 @@ def _bed(motion: Motion, machine: Printer) -> Iterator[GcodeFinding]:
 def _below(motion: Motion, _: Printer) -> Iterator[GcodeFinding]:
     """No move across goes lower than what is already printed: the nozzle would plough through it."""
     across = motion.across_mm > 0
-    prints = (motion.extruded_mm > 0) & across
     lowest = np.minimum(motion.start_mm[:, 2], motion.end_mm[:, 2])
-    printed = np.where(prints, lowest, -np.inf)
+    printed = np.where(motion.prints, lowest, -np.inf)
     named = ((e.row, e.command) for e in motion.events if e.command.code == "G92")
     anew = {row for row, command in named if command.has("Z") or not command.has("XYE")}  # heights count anew
     edges = [0, *sorted(anew), len(lowest)]
@@ -274,14 +271,13 @@ def _speed(motion: Motion, machine: Printer) -> Iterator[GcodeFinding]:
     limits = machine.max_speed_mm_s
     down = motion.z_stated & ~np.append(True, motion.z_stated[:-1])  # from where macros have left the nozzle
     down |= motion.start_mm[:, 2] != np.append(0.0, motion.end_mm[:-1, 2])
-    prints = (motion.extruded_mm > 0) & (across > 0)  # filament that is pushed with Z alone makes good for a retraction
     axes = (("X and Y", across, limits.xy), ("Z", up, limits.z), ("E", filament, limits.extruder))
     for name, length, limit in axes:
         fast = rate * length
         over = (fast > limit * (1 + 1e-6)) & ~((name == "Z") & down)
         for rows, severity, what, then in (
-            (over & prints, "error", "a line is printed", "it was sliced for another speed"),
-            (over & ~prints, "warning", "a move without printing goes", "the firmware slows it down"),
+            (over & motion.prints, "error", "a line is printed", "it was sliced for another speed"),
+            (over & ~motion.prints, "warning", "a move without printing goes", "the firmware slows it down"),
         ):
             most = float(fast[rows].max()) * MM_MIN if rows.any() else 0.0
             yield from _found(
@@ -324,7 +320,7 @@ def _z_stated(motion: Motion, machine: Printer) -> Iterator[GcodeFinding]:
         return
     where = f"{change.offset_mm[2]:g} mm above" if math.isnan(change.place_mm[2]) else f"at {change.place_mm[2]:g} mm"
     yield from _found(
-        motion, (motion.extruded_mm > 0) & (motion.across_mm > 0) & ~motion.z_stated, "z", "error",
+        motion, motion.prints & ~motion.z_stated, "z", "error",
         f"lines are printed after a tool change before Z is stated; the macros of {machine.name} leave the nozzle "
         f"{where}", "state Z (G1 Z) after each T",
     )  # fmt: skip

@@ -265,6 +265,11 @@ class Motion:
         way: Real = np.hypot(self.across_mm, self.rows[:, 5] - self.rows[:, 2])
         return way
 
+    @cached_property
+    def prints(self) -> Mask:
+        """Moves that print a line; filament that is pushed with Z alone makes good for a retraction."""
+        return np.asarray((self.extruded_mm > 0) & (self.across_mm > 0))
+
     def box_mm(self) -> tuple[Real, Real]:
         """Lowest and highest place of each move, (n, 3) twice [mm]; a straight one counts by its end."""
         if not len(self.arcs):

@@ -133,8 +133,8 @@ def _heights(text: bytes, motion: Motion, machine: Printer) -> Iterator[tuple[in
         number, feed = int(motion.number[row]), f"{motion.feed_mm_min[row]:g}"
         keeps = b"F" in lines[number - 1].partition(b";")[0].upper()
         feeds = [] if keeps else [f"G1 F{feed}\n"]
-        height = f"G1 Z{motion.start_mm[row, 2]:.4f}".rstrip("0").rstrip(".")
-        yield number, [f"{height} F{60 * machine.max_speed_mm_s.z:g}\n", *feeds]
+        height = words.word("Z", motion.start_mm[row, 2])
+        yield number, [f"G1 {height} F{60 * machine.max_speed_mm_s.z:g}\n", *feeds]
 
 
 def _own(machine: Printer, index: float) -> int:

@@ -3,10 +3,13 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partialmethod
-from typing import Annotated, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Self
 
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.findings import SEVERITIES, counted
+
+if TYPE_CHECKING:
+    from sensorgen.core.arrays import Whole
 
 NEAR_MM = 0.12  # a nozzle within this above a line is one layer over it
 FACE_MM = 0.5  # radius of the flat end of a nozzle: a guess, makers state none
@@ -40,6 +43,12 @@ class GcodeFinding:
     message: str
     advice: str
     count: int = 1
+
+    @classmethod
+    def of(cls, rule: str, lines: "Whole", message: str, advice: str, severity: str = "error") -> "GcodeFinding":
+        """A finding that shows in some lines of the file, (n,), each perhaps named more than once."""
+        numbers = set(lines.tolist())
+        return cls(rule, severity, min(numbers), message, advice, len(numbers))
 
 
 class Findings(list[GcodeFinding]):

@@ -72,6 +72,15 @@ class Command:
         return Command(self.code, tuple(word for word in self.words if word[0] not in letters))
 
 
+def word(letter: str, value: float) -> str:
+    """A word of a command, with what its number needs of four decimals.
+
+    >>> word("Z", 0.30004)
+    'Z0.3'
+    """
+    return letter + f"{value:.4f}".rstrip("0").rstrip(".")
+
+
 @dataclass(frozen=True, slots=True)
 class GcodeLine:
     """Content of a line: its commands, its remarks, and what could not be read."""
