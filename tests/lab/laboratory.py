@@ -12,6 +12,10 @@ from sensorgen.measure.lab import catalogue, experiment, run
 from sensorgen.measure.lab.devices import SimulatedClock
 from sensorgen.measure.lab.safety import RunDevices
 from sensorgen.measure.log import Log
+from sensorgen.measure.log.bench import read_again
+from sensorgen.measure.recording import joined_all
+from sensorgen.measure.signal.presses import Pairs
+from sensorgen.measure.signal.run import processed
 from sensorgen.measure.virtual import mechanics
 from sensorgen.measure.virtual.mechanics import FAULTS, FaultSchedule, Planted
 from sensorgen.measure.virtual.specimen import PressedSpecimen, drawn
@@ -101,6 +105,14 @@ def outcome(folder: Path, faults: tuple[Planted, ...] = (), **changes: Any) -> t
     """Run it with faults planted."""
     lab = laboratory(faults)
     return done(folder, lab, changes), lab
+
+
+def pairs(log: Log) -> Pairs:
+    """Presses of the only recording in a log."""
+    (row,) = log.recordings()
+    parts, rig = read_again(log, row)
+    (beside,) = joined_all(next(parts), rig)
+    return processed(beside.recording, beside).pairs
 
 
 def left_alone(lab: Laboratory, seconds: float) -> float:

@@ -50,7 +50,7 @@ def quick(monkeypatch):
         )
         found = guardian.Rescue(DEVICES)
         found.run()
-        return found.found
+        return found.outcome
 
     return rescue
 
@@ -103,7 +103,7 @@ def test_it_lifts_when_the_pipe_closes_while_it_is_armed(tmp_path, armed, releas
 
 def test_a_dead_guardian_is_noticed(tmp_path):
     watcher = guardian.Guardian(guardian.Orders(devices={}, dead_man_s=5.0, folder=str(tmp_path)))
-    os.kill(watcher.pid, signal.SIGKILL)
+    os.kill(watcher._process.pid, signal.SIGKILL)
     watcher._process.wait(10)
     with pytest.raises(DeviceFault, match="guardian: it has died"):
         watcher.beat()

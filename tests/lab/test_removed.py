@@ -3,14 +3,11 @@
 import shutil
 
 import pytest
-from laboratory import done, laboratory
+from laboratory import done, laboratory, pairs
 
 from sensorgen.measure.lab import recorder
 from sensorgen.measure.lab.devices import SimulatedClock
 from sensorgen.measure.log import Log
-from sensorgen.measure.log.bench import read_again
-from sensorgen.measure.recording import joined_all
-from sensorgen.measure.signal.run import processed
 
 
 def run_and(remove, folder, at_s=12.5):
@@ -31,28 +28,20 @@ def run_and(remove, folder, at_s=12.5):
     return found, log_path
 
 
-def presses(log):
-    (row,) = log.recordings()
-    parts, rig = read_again(log, row)
-    (beside,) = joined_all(next(parts), rig)
-    return processed(beside.recording, beside).pairs
-
-
-def remove_log(path):
-    for each in path.parent.glob("log.db*"):
-        if each.is_file():
-            each.unlink()
-
-
 def test_a_removed_log_is_an_error_and_the_next_run_logs_what_is_in_the_folder(tmp_path):
-    found, path = run_and([remove_log], tmp_path)
+    def remove(path):
+        for each in path.parent.glob("log.db*"):
+            if each.is_file():
+                each.unlink()
+
+    found, path = run_and([remove], tmp_path)
     assert found.end == "fault"
     assert "was removed or replaced" in found.reason
     assert found.rows == ()
     assert not path.exists()
     with Log(path, create=True) as log:
         recorder.recover(log, SimulatedClock())
-        assert presses(log).force_n == pytest.approx([4.0, 2.0], abs=0.05)
+        assert pairs(log).force_n == pytest.approx([4.0, 2.0], abs=0.05)
 
 
 def test_removed_folders_are_an_error_and_the_readings_are_in_the_log(tmp_path):
@@ -61,5 +50,5 @@ def test_removed_folders_are_an_error_and_the_readings_are_in_the_log(tmp_path):
     assert "was removed during the run" in found.reason
     assert len(found.rows) == 1
     with Log(path) as log:
-        assert presses(log).force_n[0] == pytest.approx(4.0, abs=0.05)
+        assert pairs(log).force_n[0] == pytest.approx(4.0, abs=0.05)
     assert recorder.RunFolder.read(recorder.home(path) / found.folder.rpartition("/")[2]).attempts == 1

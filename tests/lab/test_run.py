@@ -10,7 +10,7 @@ import pytest
 import yaml
 from click.testing import CliRunner
 from fakes import fake_lab
-from laboratory import PLAN, done, laboratory, left_alone, outcome
+from laboratory import PLAN, done, laboratory, left_alone, outcome, pairs
 
 from sensorgen.cli import cli
 from sensorgen.core import document
@@ -20,8 +20,6 @@ from sensorgen.measure.lab.devices import DeviceFault, SimulatedClock
 from sensorgen.measure.lab.experiment import Choice
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.bench import read_again
-from sensorgen.measure.recording import joined_all
-from sensorgen.measure.signal.run import processed
 from sensorgen.measure.virtual.mechanics import VirtualRig
 
 
@@ -49,14 +47,12 @@ def test_the_recording_in_the_log_has_the_presses_that_were_asked_for(tmp_path):
     assert 3.9 < lab.mechanism.peak_n < 4.2
     with Log(tmp_path / "log.db") as log:
         (row,) = log.recordings()
-        parts, rig = read_again(log, row)
-        (beside,) = joined_all(next(parts), rig)
-        pairs = processed(beside.recording, beside).pairs
+        pressed = pairs(log)
     assert row.specimen == "24 SX60"
     assert row.remark.startswith("simulated")
     assert row.source.startswith("simulated-")
-    assert pairs.force_n == pytest.approx([4.0, 2.0], abs=0.05)
-    assert pairs.position_mm == pytest.approx([30.0, 70.0])
+    assert pressed.force_n == pytest.approx([4.0, 2.0], abs=0.05)
+    assert pressed.position_mm == pytest.approx([30.0, 70.0])
     text = "\n".join(document.text(found.document()))
     assert "2 of 2 presses, simulated" in text
     assert json.loads(document.to_json(found))["end"] == "done"

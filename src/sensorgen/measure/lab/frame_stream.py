@@ -72,12 +72,12 @@ class FrameForm:
     @classmethod
     def of(cls, text: str) -> "FrameForm | None":
         """Form by a header without its checksum; None of any other line."""
-        found = _HEADER.fullmatch(text)
-        if found is None or _UNITS[found[3]] != found[5]:
+        match = _HEADER.fullmatch(text)
+        if match is None or _UNITS[match[3]] != match[5]:
             return None
         with suppress(ValueError):
-            if 0 < (frequency_hz := float(found[6])) < inf:
-                return cls(int(found[1]), int(found[2]), found[3], found[4], frequency_hz)
+            if 0 < (frequency_hz := float(match[6])) < inf:
+                return cls(int(match[1]), int(match[2]), match[3], match[4], frequency_hz)
         return None
 
     @property
@@ -107,11 +107,11 @@ class FrameForm:
         """Readings by the words of a frame, (m, n) [S]; nan where one is missing or saturated."""
         values = _PREFIXES[self.prefix] * np.array([nan if word in ("", _SATURATED) else float(word) for word in words])
         if self.form == "siemens":
-            found = values[0::2] + 1j * values[1::2]
+            siemens = values[0::2] + 1j * values[1::2]
         else:
-            found = np.full(values.shape, complex(nan, nan))
-            found.imag = 2 * np.pi * self.frequency_hz * values
-        return found.reshape(self.rows, self.columns)
+            siemens = np.full(values.shape, complex(nan, nan))
+            siemens.imag = 2 * np.pi * self.frequency_hz * values
+        return siemens.reshape(self.rows, self.columns)
 
 
 def checked(text: str) -> bytes:

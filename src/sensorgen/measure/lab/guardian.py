@@ -89,11 +89,6 @@ class Guardian(AbstractContextManager["Guardian", None]):
         os.set_blocking(self._to, False)
         os.set_blocking(self._from, False)
 
-    @property
-    def pid(self) -> int:
-        """Number of its process."""
-        return self._process.pid
-
     def __exit__(self, *_: object) -> None:
         self.close()
 
@@ -186,10 +181,10 @@ class Rescue:
     def __init__(self, devices: Mapping[str, Device]) -> None:
         self._devices, self._clock = devices, RealClock()
         self._ended = threading.Event()  # of the stage's part
-        self.found = dict.fromkeys(devices, "no answer")
+        self.outcome = dict.fromkeys(devices, "no answer")
 
     def run(self) -> None:
-        """Return when both are done, or the time is over; ``found`` says what became of each."""
+        """Return when both are done, or the time is over; ``outcome`` says what became of each."""
         ways = {"actuator": self._actuator, "stage": self._stage}
         threads = [
             threading.Thread(target=ways[role], args=(each,), daemon=True) for role, each in self._devices.items()
@@ -204,11 +199,11 @@ class Rescue:
         driver = self._opened("actuator", device)
         if driver is None or not self._tried("actuator", driver.lift):
             return
-        self.found["actuator"] = "lifted, motor on"
+        self.outcome["actuator"] = "lifted, motor on"
         time.sleep(_UP_S)
         self._ended.wait(2 * _TRIES_S + _RAISE_S)
-        if self.found.get("stage") == _RAISED and self._tried("actuator", driver.off):
-            self.found["actuator"] = "lifted, motor off"
+        if self.outcome.get("stage") == _RAISED and self._tried("actuator", driver.off):
+            self.outcome["actuator"] = "lifted, motor off"
 
     def _stage(self, device: Device) -> None:
         try:
@@ -220,16 +215,16 @@ class Rescue:
 
     def _raise(self, driver: Any) -> None:
         """Follow the stage up; one that refuses, as before it has its zero, is asked once more."""
-        self.found["stage"] = "not raised in time"
+        self.outcome["stage"] = "not raised in time"
         until, refused = time.monotonic() + _RAISE_S, 0
         while time.monotonic() < until and refused < _REFUSED:
             time.sleep(_AGAIN_S)
             try:
                 if not driver.read().moving:
-                    self.found["stage"] = _RAISED
+                    self.outcome["stage"] = _RAISED
                     return
             except SensorgenError as error:
-                self.found["stage"] = str(error)
+                self.outcome["stage"] = str(error)
                 refused += 1
                 self._tried("stage", driver.lift)
 
@@ -246,7 +241,7 @@ class Rescue:
             try:
                 call()
             except (SensorgenError, OSError) as error:
-                self.found[role] = str(error)
+                self.outcome[role] = str(error)
                 if time.monotonic() > until:
                     return False
                 time.sleep(_AGAIN_S)
@@ -272,7 +267,7 @@ def main() -> None:
         begun, rescue = time.monotonic(), Rescue(orders.devices)
         rescue.run()
         took = round(time.monotonic() - begun, 3)
-        done = {"at": round(time.time(), 3), "reason": reason, "devices": rescue.found, "took_s": took}
+        done = {"at": round(time.time(), 3), "reason": reason, "devices": rescue.outcome, "took_s": took}
         with suppress(OSError), (Path(orders.folder) / REPORT).open("a", encoding="utf-8") as file:
             file.write(json.dumps(done) + "\n")
 

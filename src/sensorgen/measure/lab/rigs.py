@@ -55,7 +55,7 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Run
         plant = mechanics.rig_of(virtual, design, experiment.pressing.length_mm * 1e-3)
         plant.specimen.blank  # noqa: B018 - solved now: one that cannot be is refused before the run begins
 
-    def made(device: Device) -> Any:
+    def driver(device: Device) -> Any:
         settings = dict(device.settings)
         if device.kind == SIMULATED.actuator.kind:
             settings = {"weight_n": plant.mechanics.weight_n, "friction_n": plant.mechanics.friction_n} | settings
@@ -66,7 +66,7 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Run
             plant.planted.attach(_STRIKES[device.kind], of.simulator)
         return of.driver
 
-    return RunDevices(**_drivers(devices, made)), plant
+    return RunDevices(**_drivers(devices, driver)), plant
 
 
 def _drivers(devices: Devices, driver_of: Callable[[Device], Any]) -> dict[str, Any]:

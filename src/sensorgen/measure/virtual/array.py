@@ -124,7 +124,7 @@ class VirtualArray:
     ) -> Complex:
         """Frames under loads, (k, m, n), by the first frequency [S]."""
         pressure_kpa = self.spread(pressure_kpa)
-        found = np.empty(pressure_kpa.shape, complex)
+        siemens = np.empty(pressure_kpa.shape, complex)
         play = slow = most = np.zeros(pressure_kpa.shape[1:])
         for k, (load, elapsed) in enumerate(zip(pressure_kpa, np.diff(time_s, prepend=time_s[0]), strict=True)):
             most = np.maximum(most, load)
@@ -132,9 +132,9 @@ class VirtualArray:
             slow = slow + (load - slow) * -np.expm1(-elapsed / _CREEP_S)
             felt = (1 - self.creep) * (load + play) / 2 + self.creep * slow
             ratio = 1 + np.exp(self.drift * day) * self.rise(felt)
-            found[k] = nodal(self.tracks, self.tracks.capacitance_f * ratio, readout)
-        sigma = np.hypot(readout.noise * np.abs(found), readout.noise_s)
-        return np.asarray(found + sigma * (draw.normal(size=found.shape) + 1j * draw.normal(size=found.shape)))
+            siemens[k] = nodal(self.tracks, self.tracks.capacitance_f * ratio, readout)
+        sigma = np.hypot(readout.noise * np.abs(siemens), readout.noise_s)
+        return np.asarray(siemens + sigma * (draw.normal(size=siemens.shape) + 1j * draw.normal(size=siemens.shape)))
 
 
 def closing(strain: Real, power: Real) -> Callable[[Real], Real]:
@@ -316,5 +316,5 @@ def sender(
     cycle = np.concatenate([maps, np.zeros((max(1, round(_SWING_S * rate_hz)), *maps.shape[1:]))])
     load = np.concatenate([0 * cycle[:1], *[cycle] * _SETTLED])
     quiet = replace(readout, noise=1e-15, noise_s=0.0)
-    found = print_.frames(load, np.arange(len(load)) / rate_hz, quiet, np.random.default_rng(0))
-    return FrameSender(found[0], found[-len(cycle) :], readout, rate_hz)
+    siemens = print_.frames(load, np.arange(len(load)) / rate_hz, quiet, np.random.default_rng(0))
+    return FrameSender(siemens[0], siemens[-len(cycle) :], readout, rate_hz)

@@ -202,11 +202,11 @@ def _filled(
 ) -> Whole:
     """Materials and terminals of the bricks between planes (2, nx, ny, nz)."""
     x, y, z = planes
-    found = np.zeros((2, len(x) - 1, len(y) - 1, len(z) - 1), int)
+    kinds = np.zeros((2, len(x) - 1, len(y) - 1, len(z) - 1), int)
     for body, outline, (low, high) in pieces:
         here = _covered(outline, x, y)[..., None] & (low < (z[1:] + z[:-1]) / 2) & ((z[1:] + z[:-1]) / 2 < high)
-        found[:, here] = np.array([materials[body.material], TERMINALS.get(body.terminal, 0)])[:, None]
-    return found
+        kinds[:, here] = np.array([materials[body.material], TERMINALS.get(body.terminal, 0)])[:, None]
+    return kinds
 
 
 def _covered(outline: Outline, x: Real, y: Real) -> Mask:

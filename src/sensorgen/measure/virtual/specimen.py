@@ -84,20 +84,12 @@ class Truth(Strict):
     short_opens_n: float = Field(ge=0, default_factory=lambda: np.inf)
 
 
-def spreads(design: Design) -> dict[str, tuple[float, float]]:
-    """Mean and standard deviation of ln of the materials' values over the design's, by quantity."""
-    electrode, dielectric = (
-        design.slot("bottom_electrode"),
-        (design.material(film(design)), design.used()[film(design)]),
-    )
-    of = {"resistivity_ohm_m": electrode, "relative_permittivity": dielectric, "youngs_modulus_pa": dielectric}
-    return {quantity: ln_spread(*slot, quantity) for quantity, slot in of.items()}
-
-
 def drawn(design: Design, seed: int) -> Truth:
     """A random specimen of a design; equal for equal seeds."""
-    rng = np.random.default_rng(seed)
-    by = {name: float(rng.normal(*normal)) for name, normal in sorted(spreads(design).items())}
+    rng, dielectric = np.random.default_rng(seed), (design.material(film(design)), design.used()[film(design)])
+    electrode = design.slot("bottom_electrode")
+    slots = {"relative_permittivity": dielectric, "resistivity_ohm_m": electrode, "youngs_modulus_pa": dielectric}
+    by = {quantity: float(rng.normal(*ln_spread(*slot, quantity))) for quantity, slot in slots.items()}
 
     def waves(sd: float) -> tuple[float, ...]:
         return tuple((rng.normal(0.0, sd, 3) / np.arange(1, 4)).tolist())
