@@ -5,7 +5,6 @@ from collections import defaultdict
 import pytest
 
 from sensorgen.design.shapes import reference, tri
-from sensorgen.scene import repetition as cells
 from sensorgen.scene.repetition import SectionCell, cell
 from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 from sensorgen.scene.sections import ROUNDING_MM, sections
@@ -150,16 +149,3 @@ def test_a_row_without_mirrors_is_solved_as_a_whole():
     found_here = found(steps(6))
     assert width_mm(found_here) == pytest.approx(6.0)
     assert set(found_here.shares) == {1.0}
-
-
-def test_a_row_without_mirrors_is_looked_at_once_for_each_place(monkeypatch):
-    """Not once for each pair of places: 50 periods took 14 s."""
-    looked = []
-    repeats = cells.repeats
-    monkeypatch.setattr(cells, "repeats", lambda *given: looked.append(given[1:]) or repeats(*given))
-    section = sections(steps(12))[0]
-    found_here = cells.mirrored(tuple(cells.slices(section, HEIGHT_MM)))
-    edges = {x for s in found_here.slices for x in (s.left_mm, s.right_mm)}
-    places = edges | {(s.left_mm + s.right_mm) / 2 for s in found_here.slices if s.is_flat()}
-    assert len(found_here.slices) == 12 * 4
-    assert len(looked) < len(places)

@@ -34,7 +34,7 @@ def terms(**effects):
     return {t.name: t for t in budget.terms}
 
 
-def chain(force, place, eps=1.0, rho=1.0, under=1.0, rise=1.0, n=1500):
+def chain(force, place, eps=1.0, rho=1.0, under=1.0, rise=1.0, n=500):
     """Impedance of a chain of n short pieces, each a resistor and a capacitor, open at its far end."""
     omega = 2 * np.pi * np.array(TONES_HZ)
     edges = np.linspace(0.0, LENGTH_M, n + 1)
@@ -92,7 +92,7 @@ def test_a_rise_that_is_larger_is_a_larger_force():
     assert found.position_m < 1e-6
 
 
-@pytest.mark.parametrize("hertz", [1e4, 1e5, 3e5, 1e6])
+@pytest.mark.parametrize("hertz", [1e4, 1e6])
 def test_a_series_circuit_that_is_taken_for_a_parallel_one(hertz):
     """A resistor before a plate: D = w R C. Values of R and C in parallel with that impedance, and the press read."""
     ohm, omega, area_m2 = 2e4, 2 * np.pi * hertz, WIDTH_M * TIP_M

@@ -102,10 +102,3 @@ def test_steps_that_touch_in_a_corner_are_parted(gap):
     lost_mm2 = (2e-3 * 0.15 / 2) * (1 if cell.mirrored else 2) * (gap == 0)
     assert not pinches(cell)
     assert outline.area == pytest.approx(drawn_mm2 * cell.width_mm() / 2 - lost_mm2, abs=1e-9)
-
-
-@pytest.mark.nightly
-def test_five_hundred_thin_electrodes_end_no_process():
-    found = meshed(500)
-    assert len(found) == 500
-    assert sum(isinstance(one, str) for one in found) < 25  # 5 %: a message, where a mesher ends or refuses

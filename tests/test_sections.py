@@ -52,12 +52,6 @@ def test_columns_cover_the_section_and_layers_do_not_overlap(scene):
                 assert all(t <= b + 1e-12 for t, b in zip(low.top_mm, high.bottom_mm, strict=True))
 
 
-def test_depths_add_up_to_the_sensor(scene):
-    found = sections(scene)
-    normal = "yx"["xy".index(found[0].across)]
-    assert sum(s.depth_mm for s in found) == pytest.approx(scene.size_mm["xy".index(normal)], rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("shape", "options", "depths"),
     [

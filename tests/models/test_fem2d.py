@@ -18,12 +18,11 @@ def holds(found, low: float, high: float | None = None) -> bool:
     return found.lower <= (low if high is None else high) and low <= found.upper
 
 
-@pytest.mark.parametrize("width", [1e-4, 1e-6])
 @pytest.mark.parametrize("case", CELLS["tri"], ids=lambda c: f"d={c['d']}")
-def test_tri_lies_between_its_bounds(case, width):
-    found = fem2d.capacitance(tri_cell(case["d"]), EPS, width).times(1 / MM)
+def test_tri_lies_between_its_bounds(case):
+    found = fem2d.capacitance(tri_cell(case["d"]), EPS, 1e-6).times(1 / MM)
     off = case["rel_error_halfwidth"]
-    assert found.width() <= width
+    assert found.width() <= 1e-6
     assert holds(found, case["C_F_per_m"] * (1 - off), case["C_F_per_m"] * (1 + off))
 
 
@@ -80,10 +79,8 @@ def test_support_of_the_films_kind_fills_the_air():
 @pytest.mark.parametrize(
     ("eps", "width", "words"),
     [
-        (EPS | {"x60": 0.0}, 1e-4, "x60 is 0"),
-        (EPS | {"x60": -1.0}, 1e-4, "above 0"),
+        (EPS | {"x60": 0.0}, 1e-4, "x60 is 0; expected a number above 0"),
         (EPS | {"air": float("nan")}, 1e-4, "air"),
-        (EPS, 0.0, "accuracy"),
         (EPS, float("nan"), "accuracy"),
     ],
 )

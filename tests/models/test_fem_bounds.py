@@ -57,7 +57,7 @@ def test_crossed_bounds_stop(lower):
         _fem_bounds.whole(_fem_bounds.Energies(lower, 1.0, 0.0, 1), [1.0])
 
 
-@pytest.mark.parametrize(("lower", "upper"), [(0.0, 1.0), (-1.0, 1.0), (np.nan, 1.0), (1.0, np.nan), (1.0, np.inf)])
+@pytest.mark.parametrize(("lower", "upper"), [(0.0, 1.0), (np.nan, 1.0), (1.0, np.inf)])
 def test_bounds_that_tell_nothing_are_no_solution(lower, upper):
     with pytest.raises(_fem_bounds.Unsolved, match="doubles"):
         _fem_bounds.whole(_fem_bounds.Energies(lower, upper, 0.0, 1), [1.0])

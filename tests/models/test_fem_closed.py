@@ -23,25 +23,6 @@ def _closed_below(cell):
         return _fem_triangles.triangles(cell)
 
 
-def test_a_strip_between_plates():
-    """Stripline of no thickness: C = 4 eps0 K(k)/K(k'), k = tanh(pi w / (2 b)); half of it, above the strip's plane.
-
-    Strip of width 1 at one height with two plates 1 apart: upper half between a mirror plane (beside the strip) and the
-    plate. The strip as floor's electrode, the mirror beside it as an open floor.
-    """
-    w, b, end = 1.0, 1.0, 4.0
-    strip = Body("low", "etpu", (box(end - w / 2, end + w / 2, 0, 1, 0, 0.1),), "bottom")
-    plate = Body("high", "etpu", (box(0, 2 * end, 0, 1, 0.1 + b / 2, 0.2 + b / 2),), "top")
-    sides = box(0, end - w / 2, 0, 1, 0, 0.1), box(end + w / 2, 2 * end, 0, 1, 0, 0.1)
-    gap = Body("wall", "wall", sides)  # hardly any permittivity: a mirror, up to 1e-9
-    scene = Scene((strip, gap, plate), (2 * end, 1.0, 0.2 + b / 2))
-    found = _open_floor(scene, {"air": 1.0, "wall": 1e-9}, 1e-6)
-    k = np.tanh(np.pi * w / (2 * b))
-    exact = 4 * EPS0_F_PER_M * ellipk(k**2) / ellipk(1 - k**2) / 2 * MM  # the upper half of the line
-    assert found.width() < 1e-6
-    assert found.middle() == close(exact, 1e-6)
-
-
 def _open_floor(scene, permittivity, width):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sensorgen.models.fem2d.triangles", _closed_below)

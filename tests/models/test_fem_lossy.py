@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from cell_scenes import EPS, MM, close, cut_slabs, plates, rect_cell, stairs, tri_cell
 
-from sensorgen.core.bounds import Disc
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M
-from sensorgen.design.shapes import tri
 from sensorgen.models import fem2d, fem3d
-from sensorgen.scene.scene import Body, Fill, box
+from sensorgen.scene.scene import Body, box
 from sensorgen.solvers.electrostatics.bounds import Fields, disc, turned
 
 BOTH = pytest.mark.parametrize("model", [fem2d, fem3d])
@@ -17,9 +15,7 @@ LOSSY = {"x60": 4.68 * (1 - 0.3j), "air": 1.00059}
 
 
 @BOTH
-@pytest.mark.parametrize(
-    ("first", "second"), [(4.68, 1.0 + 0j), (1e4, 1 - 1e-9j), (3.0 - 0.5j, 2.0 - 1.5j), (1 - 50j, 9.0)]
-)
+@pytest.mark.parametrize(("first", "second"), [(1e4, 1 - 1e-9j), (3.0 - 0.5j, 2.0 - 1.5j), (1 - 50j, 9.0)])
 def test_layers_in_series_and_side_by_side(model, first, second):
     """1/C = sum of t/eps, or C = sum of w eps: also where charge gathers between a leak and none (Maxwell, Wagner)."""
     eps = {"a": first, "b": second, "air": 1.0}
@@ -58,7 +54,7 @@ def test_a_small_loss_is_the_slope_of_the_lossless():
     assert found.centre.imag == close(-delta * (up - down) / (2 * step), 1e-4)
 
 
-@pytest.mark.parametrize("tangent", [0.01, 1.0])
+@pytest.mark.parametrize("tangent", [0.01, 1.0, 1e3])
 def test_finer_meshes_lie_in_the_coarse_disc(tangent):
     scene, eps = tri_cell(0.1), {"x60": 4.68 * (1 - 1j * tangent), "air": 1.00059}
     coarse, fine = fem2d.lossy(scene, eps, 1e-2), fem2d.lossy(scene, eps, 1e-6)
@@ -119,27 +115,11 @@ def test_a_tangent_of_one_and_more_leaves_the_wide_disc():
     assert found.radius == close(0.2 * np.hypot(1, np.tan(0.255 * np.pi)), 1e-6)
 
 
-def test_discs_scale_and_hold():
-    near = Disc(2 - 1j, 0.5)
-    assert near.times(2.0) == Disc(4 - 2j, 1.0)
-    assert near.holds(2.3 - 0.7j)
-    assert not near.holds(2.4 - 0.6j)
-    assert near.width() == close(1 / 5**0.5, 1e-12)
-
-
 @BOTH
-@pytest.mark.parametrize("bad", [-1 - 1j, complex(np.nan, 0), complex(1, -np.inf), 0 - 1j])
+@pytest.mark.parametrize("bad", [complex(1, -np.inf), 0 - 1j])
 def test_permittivities_that_mean_nothing_are_refused(model, bad):
     with pytest.raises(OutOfRange, match="relative permittivity of x60"):
         model.lossy(stairs(), {"x60": bad, "air": 1.0}, 1e-3)
-
-
-def test_a_strong_leak_at_a_sharp_wedge_of_air():
-    """5000 times the air's permittivity: so nearly a conductor that C'' is that of its modulus, turned."""
-    eps = {"x60": 4.68 * (1 - 1e3j), "air": 1.00059}
-    coarse, found = (fem2d.lossy(tri_cell(0.1), eps, w) for w in (1e-2, 1e-5))
-    assert found.width() < 1e-5
-    assert coarse.holds(found.centre)
 
 
 def test_a_cut_cell_holds_the_truth():
@@ -149,11 +129,3 @@ def test_a_cut_cell_holds_the_truth():
     found = fem2d.lossy(scene, LOSSY, 1e-4)
     assert found.holds(exact * EPS0_F_PER_M * MM)
     assert found.width() < 1e-4
-
-
-def test_a_cut_cell_scales_with_its_permittivities():
-    """A hundred times the permittivities: a hundred times the centre, and the radius, what the cut adds included."""
-    scene = tri.scene(tri.Params(length_mm=5.3, width_mm=1.0), Fill())
-    one, hundred = (fem2d.lossy(scene, {m: k * e for m, e in LOSSY.items()}, 1e-2) for k in (1, 100))
-    assert hundred.centre == close(100 * one.centre, 1e-9)
-    assert hundred.radius == close(100 * one.radius, 1e-6)

@@ -12,7 +12,6 @@ from sensorgen.solvers.electrostatics import bounds
 
 SLAB = slab()
 ISLANDS = {
-    "one": plates(SLAB, bars("i", "top", (0.5, 0.9, 0.5, 0.8), (1.3, 1.5, 0.6, 0.7))),
     "of both": plates(SLAB, bars("i", "bottom", (0.3, 0.8, 0.8, 1.0)), bars("j", "top", (1.2, 1.7, 0.5, 0.7))),
     "in a row": plates(
         SLAB, bars("i", "bottom", (0.3, 0.8, 0.8, 1.0)), bars("j", "top", (0.4, 0.9, 0.5, 0.7), (1.3, 1.5, 0.6, 0.7))
@@ -87,7 +86,7 @@ def test_islands_of_electrode_as_bricks_have_them(name):
     assert bricks.lower < flat.lower < flat.upper < bricks.upper
 
 
-@pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])
+@pytest.mark.parametrize("ratio", [1e2, 1e6])
 def test_high_ratios_of_permittivity_at_a_sharp_wedge(ratio):
     """1e-4 at all of them; coarser bounds hold the finer, and C is homogeneous in the permittivities."""
     eps = {"x60": ratio, "air": 1.0}

@@ -10,7 +10,7 @@ from sensorgen.scene.scene import Body, box
 from sensorgen.solvers.electrostatics import bounds as _fem_bounds
 
 
-@pytest.mark.parametrize("film_mm", [0.2, 1e-2, 1e-4, 1e-5])
+@pytest.mark.parametrize("film_mm", [1e-2, 1e-5])
 def test_thin_films_down_to_a_nanometre(film_mm):
     """From film to film a tenth as thick C' grows by 4.087e-11 F/m per e-fold, once the film is thin against
     the cell.
@@ -18,8 +18,7 @@ def test_thin_films_down_to_a_nanometre(film_mm):
     found = fem2d.capacitance(tri_cell(film_mm), EPS, 1e-4).times(1 / MM)
     thinner = fem2d.capacitance(tri_cell(film_mm / 10), EPS, 1e-4).times(1 / MM)
     assert found.width() < 1e-4
-    if film_mm <= 1e-2:
-        assert (thinner.middle() - found.middle()) / np.log(10) == close(4.087e-11, 5e-3)
+    assert (thinner.middle() - found.middle()) / np.log(10) == close(4.087e-11, 5e-3)
     assert thinner.lower > found.upper
 
 

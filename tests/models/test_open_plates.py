@@ -6,7 +6,6 @@ from math import cos, log, pi, sin, sqrt
 
 import numpy as np
 import pytest
-import voxels
 
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import capacitance_models, overlap, prisms
@@ -59,31 +58,6 @@ def plates(more=()):
 
 
 @solver
-@pytest.mark.parametrize("width", [8e-2, pytest.param(3e-2, marks=pytest.mark.nightly)])
-def test_plates_of_different_size_are_those_of_voxels(width):
-    """Networks in a box of air of 2 mm around: the lower one holds in free air, the upper one misses that far field."""
-    h, air = 0.25 / 2, 2.0
-    n = [round((size + 2 * air) / h) for size in (3.0, 3.0, 1.0)]
-    x, y, z = np.meshgrid(*((np.arange(k) + 0.5) * h - air for k in n), indexing="ij")
-    eps, metal = np.ones(n), np.full(n, -1)
-
-    def within(x0, x1, y0, y1, z0, z1):
-        return (x > x0) & (x < x1) & (y > y0) & (y < y1) & (z > z0) & (z < z1)
-
-    eps[within(0, 3, 0, 1.5, 0.25, 0.5)] = 4.68
-    metal[within(0, 3, 0, 3, 0, 0.25)] = 0
-    metal[within(0.5, 2.0, 0.75, 2.0, 0.75, 1.0)] = 1
-    low, high = (EPS0_F_PER_M * MM * bound(eps, metal, h) for bound in (voxels.lower, voxels.upper))
-    found = prisms.capacitance(plates(), EPS, width)
-    assert found.width() < width
-    assert low < found.upper
-    assert found.lower < high
-    assert found.middle() == pytest.approx((low + high) / 2, rel=0.05)
-    rough = overlap.capacitance(plates(), EPS)
-    assert rough.lower < found.lower < found.upper < rough.upper
-
-
-@solver
 def test_a_conductor_that_floats_between_them_shortens_the_way_of_the_flux():
     floating = Body("shield", "etpu", (box(0, 3, 0, 3, 0.5, 0.625),), FLOATING)
     scene = plates((floating,))
@@ -106,8 +80,8 @@ def test_a_slanted_pad_lies_between_the_boxes_that_enclose_it():
             Body("pad", "x60", (piece,)),
             Body("up", "etpu", (lid,), "top"),
         )
-        found.append(prisms.capacitance(Scene(bodies, (30, 10, 1.6)), EPS, 1e-2))
-    assert all(one.width() < 1e-2 for one in found)
+        found.append(prisms.capacitance(Scene(bodies, (30, 10, 1.6)), EPS, 4e-2))
+    assert all(one.width() < 4e-2 for one in found)
     assert found[0].lower < found[1].upper
     assert found[1].lower < found[2].upper
     assert found[0].middle() < found[1].middle() < found[2].middle()

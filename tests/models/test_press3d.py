@@ -48,13 +48,7 @@ def pressed_rect():
 
 @pytest.mark.parametrize(
     ("nu", "period"),
-    [
-        pytest.param(0.3, "fixed", marks=pytest.mark.nightly),
-        (0.4999, "fixed"),
-        (0.3, "free"),
-        pytest.param(0.4999, "free", marks=pytest.mark.nightly),
-        (0.5, "free"),
-    ],
+    [(0.4999, "fixed"), (0.3, "free"), (0.5, "free")],
 )
 def test_a_block_follows_the_closed_form(nu, period):
     """Homogeneous neo-Hookean block: stretch a across in both directions, b along the load; at a third of E."""
@@ -78,7 +72,7 @@ def test_the_tangent_is_the_derivative_of_the_residual_and_that_of_the_energy():
     check_derivatives(elements, u, inner, moved, moved_inner)
 
 
-@pytest.mark.parametrize(("thick", "stiffer"), [pytest.param(0.6, 92.6, marks=pytest.mark.nightly), (0.2, 830.4)])
+@pytest.mark.parametrize(("thick", "stiffer"), [(0.2, 830.4)])
 def test_a_bonded_strip_does_not_lock(thick, stiffer):
     """Upper half of a strip 10 mm wide bonded to stiff plates, sides free, incompressible: solved in 2D elsewhere."""
     x = np.append(5 * (1 - (1 - np.linspace(0, 1, 25)) ** 1.5), 5.5)
@@ -232,48 +226,21 @@ def test_stairs_as_boxes_are_stairs_as_a_cross_section(lift):
     assert grown[1][2] / grown[1][0] - 1 == pytest.approx(grown[0][2] / grown[0][0] - 1, rel=0.01 if lift else 0.04)
 
 
-@pytest.mark.nightly
-def test_the_side_of_a_foot_that_rolls_onto_the_film_touches_it():
-    """A soft foot bulges over the film that it is bonded to: faces that were square as drawn meet."""
-    soft, stress = solids(x60=1e6), [0.0, 5e4, 1e5]
-    flat = press2d.press(press2d.cell(stairs(0.3, 0.3), 2.0), soft, stress)
-    solid = press3d.press(press3d.cell(stairs(0.3, 0.3)), soft, stress, fineness=BrickCounts(3, 0.3))
-    assert flat.faults == solid.faults == ()
-    assert "faces of gaps touch, without friction" in solid.doubts
-    assert solid.displacement_m[1:] == pytest.approx(flat.displacement_m[1:], rel=0.04)  # 0.046 where they overlap
-
-
 def test_feet_that_stick_are_stiffer_by_as_much_as_in_a_cross_section():
     """By how much sticking stiffens, against a fine mesh of the plane model: its first one is 4 % off in that."""
-    scene, stress = stairs(0.3, lift=0.02), [0.0, 1e4, 2e4]
+    scene, stress = stairs(0.3, lift=0.02), [0.0, 2e4]
     moved = {}
     for kind in ("frictionless", "stick"):
         held = BoundaryConditions(contact=kind)
-        flat = press2d.press(press2d.cell(scene, 2.0), solids(), stress, EPS, held, press2d.Fineness().finer())
-        solid = press3d.press(press3d.cell(scene), solids(), stress, EPS, held, BrickCounts(2, 0.4))
+        flat = press2d.press(press2d.cell(scene, 2.0), solids(), stress, None, held, press2d.Fineness().finer())
+        solid = press3d.press(press3d.cell(scene), solids(), stress, None, held, BrickCounts(2, 0.4))
         assert flat.faults == solid.faults == ()
         assert abs(solid.imbalance[-1]) < 2e-3
-        moved[kind] = flat, solid
-    less = [moved["stick"][k].displacement_m[1:] / moved["frictionless"][k].displacement_m[1:] - 1 for k in range(2)]
+        moved[kind] = flat.displacement_m[1], solid.displacement_m[1]
+    less = [moved["stick"][k] / moved["frictionless"][k] - 1 for k in range(2)]
     assert less[1] == pytest.approx(less[0], rel=0.03)
-    assert all(less[1] < -1e-3)
-    for flat, solid in moved.values():
-        grown = [[c.middle() for c in f.capacitance_f_per_m2] for f in (flat, solid)]
-        assert grown[1] == pytest.approx(grown[0], rel=2e-3)
-    assert "faces of gaps touch, and hold fast" in moved["stick"][1].doubts
-
-
-def test_upright_walls_hold_each_other_apart():
-    """A soft block bulges into the narrow slot beside it and then leans on the stiff wall beyond."""
-    soft = {"x60": Elastic(6e6, 0.49), "etpu": Elastic(1e9, 0.3)}
-    fill = np.array([[[2, 1, 3]], [[2, 0, 3]], [[2, 2, 3]]])
-    cell = boxes(((0, 0.4, 0.402, 0.5), (0, 0.2), (0, 0.1, 0.5, 0.6)), fill)
-    found = press3d.press(cell, soft, [0.0, 2e5, 4e5, 6e5, 8e5], None, fineness=BrickCounts(2, 0.6))
-    assert found.faults == ()
-    assert "faces of gaps touch" in found.doubts[-1]
-    slopes = np.diff(found.displacement_m)
-    assert slopes[-1] < 0.75 * slopes[0]
-    assert 0 < found.penetration[-1] < 0.02
+    assert less[1] < -1e-3
+    assert "faces of gaps touch, and hold fast" in solid.doubts
 
 
 def test_points_meet_the_nearest_face_along_their_normal():
@@ -314,25 +281,12 @@ def test_a_block_that_bulges_to_a_mirror_meets_its_image():
     assert moved[2] < 0.65 * moved[0]
 
 
-def test_gaps_are_runs_of_air_between_solids_along_each_axis():
-    fill = np.array([[[1, 0, 1, 1]], [[1, 0, 0, 1]], [[0, 0, 0, 1]]])
-    found = {axis: (below.tolist(), above.tolist()) for axis, below, above in air.facing(fill)}
-    assert found[2] == ([[0, 0, 0], [1, 0, 0]], [[0, 0, 2], [1, 0, 3]])
-    assert found[0] == found[1] == ([], [])
-    slot = np.array([[[1]], [[0]], [[2]]])
-    assert [len(below) for _, below, _ in air.facing(slot)] == [1, 0, 0]
-
-
-def test_moduli_scale_and_incompressible_is_the_limit():
-    cell = press3d.cell(rect())
-    one = press3d.press(cell, solids(), [0.0, 2e4], fineness=BrickCounts(1))
-    five = press3d.press(cell, solids(x60=30e6, etpu=110e6), [0.0, 1e5], fineness=BrickCounts(1))
-    assert five.displacement_m == pytest.approx(one.displacement_m, rel=1e-5, abs=1e-15)
-    moved = [
-        press3d.press(cell, solids(nu), [0.0, 2e4], fineness=BrickCounts(1)).displacement_m[-1]
-        for nu in (0.4999, 0.49999, 0.5)
-    ]
-    assert moved[0] > moved[1] > moved[2] > 0.995 * moved[0]
+def test_incompressible_is_the_limit():
+    softer, limit = (
+        press3d.press(press3d.cell(rect()), solids(nu), [0.0, 2e4], fineness=BrickCounts(1)).displacement_m[-1]
+        for nu in (0.4999, 0.5)
+    )
+    assert softer > limit > 0.995 * softer
 
 
 def test_what_is_wrong_is_refused():
@@ -422,18 +376,6 @@ def test_the_stated_rise_holds_that_of_a_second_program():
     assert abs(moved - exact["displacement_um"]) < off < 0.01 * moved
     raw = fine.capacitance_f_per_m2[1].middle() / rest.middle() - 1
     assert abs(raw - exact["rise"]) > error  # the finer mesh alone lies outside
-
-
-def test_couplings_that_cancel_are_couplings():
-    """Of three neighbours in a row they add up to nothing: blocks that touch would be taken for apart."""
-    places = np.array(list(product(range(9), range(9), range(3))))
-    weight = np.array([1.0, 1.0, -2.0])[places[:, 1] % 3]
-    near = (abs(places[:, None] - places[None]).max(axis=2) <= 1) & ~np.eye(len(places), dtype=bool)
-    matrix = np.where(near, weight[:, None] * weight, 0.0) + 200 * np.eye(len(places))
-    order = factors.order_of(csr_matrix(matrix), places)
-    right = np.arange(len(places)) + 1.0
-    found = factors.factored(csr_matrix(matrix), order).solve(right)
-    assert found == pytest.approx(np.linalg.solve(matrix, right), rel=1e-5)
 
 
 def test_air_goes_along_evenly_with_what_is_stretched_evenly():

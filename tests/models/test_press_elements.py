@@ -35,9 +35,7 @@ def pressed(mesh, e, nu, held, stress, steps=5):
     return problem, list(load.curve(problem, np.linspace(0, stress, steps + 1), stress))[-1]
 
 
-@pytest.mark.parametrize(
-    ("nu", "period"), [(0.3, "fixed"), (0.4999, "fixed"), (0.3, "free"), (0.4999, "free"), (0.5, "free")]
-)
+@pytest.mark.parametrize(("nu", "period"), [(0.4999, "fixed"), (0.3, "free"), (0.5, "free")])
 def test_a_block_follows_the_closed_form_on_any_mesh(nu, period):
     """Homogeneous neo-Hookean block: stretch a across, b along the load, nothing pulls sideways where free."""
     mesh = grid(3, 3, bend=0.08)
@@ -56,12 +54,10 @@ def test_the_tangent_is_the_derivative_of_the_residual_and_that_of_the_energy():
     check_derivatives(e, u, inner, rng.normal(size=len(u)), rng.normal(size=(8, 5)))
 
 
-@pytest.mark.parametrize(("thick", "stiffer"), [
-    pytest.param(0.6, 94, marks=pytest.mark.nightly), (0.2, 835), pytest.param(0.1, 3335, marks=pytest.mark.nightly)
-])  # fmt: skip
+@pytest.mark.parametrize(("thick", "stiffer"), [(0.2, 835)])
 def test_a_bonded_strip_is_as_stiff_as_gent_and_lindley_say(thick, stiffer):
     """Half of a strip 10 mm wide, sides free, between stiff plates to which it is bonded; exactly incompressible."""
-    mesh = grid(60, 4, wide=5.0, high=thick)
+    mesh = grid(40, 3, wide=5.0, high=thick)
     x, y = mesh.points_m.T
     fixed = np.zeros(2 * len(x), bool)
     fixed[2 * np.flatnonzero((x == 0) | (y == 0) | (y == y.max()))] = True

@@ -74,13 +74,13 @@ def test_slanted_strips_are_straight_ones_turned():
     lines = [((k, 0), (k + 0.8, 0), (k + 0.8 + side, side), (k + side, side)) for k in range(-6, 6, 2)]
     plan = shapely.clip_by_rect(shapely.union_all([shapely.Polygon(o) for o in lines]), 0, 0, side, side)
     scene = sensor(rounded_all(plan), (side, side))
-    found = prisms.capacitance(scene, EPS, 5e-3)
+    found = prisms.capacitance(scene, EPS, 1e-2)
     period, wide = sqrt(2), 0.4 * sqrt(2)
     starts = rounded(period), rounded(period + wide)
     straight = sensor([((s, 0.0), (s + wide, 0.0), (s + wide, 1.0), (s, 1.0)) for s in (0.0, *starts[:1])],
                       (rounded(2 * period), 1.0))  # fmt: skip
     exact = fem2d.capacitance(straight, EPS, 1e-4).times(side**2 / (2 * period))
-    holds(found, exact, 5e-3)
+    holds(found, exact, 1e-2)
 
 
 def test_turned_square_posts_on_a_turned_lattice_are_the_same_posts():
@@ -93,11 +93,11 @@ def test_turned_square_posts_on_a_turned_lattice_are_the_same_posts():
     turned = sensor(rounded_all(shapely.clip_by_rect(plan, 0, 0, 2 * apart, 2 * apart)), (2 * apart,) * 2)
     square = [((x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)) for x in (0.5, 2.5) for y in (0.5, 2.5)]
     exact = fem3d.capacitance(sensor(square, (4.0, 4.0)), EPS, 1e-3).times(2 * apart**2 / 8)
-    holds(prisms.capacitance(turned, EPS, 1e-2), exact, 1e-2)
+    holds(prisms.capacitance(turned, EPS, 3e-2), exact, 3e-2)
 
 
 def test_a_round_post_lies_within_two_networks_on_voxels():
-    found = prisms.capacitance(sensor([post(1.5, 1.5, 0.5)]), EPS, 1e-2)
+    found = prisms.capacitance(sensor([post(1.5, 1.5, 0.5)]), EPS, 3e-2)
 
     def part(x, y):
         return (x - 1.5) ** 2 + (y - 1.5) ** 2 < 0.25
@@ -179,8 +179,8 @@ def test_a_seam_through_conductors_that_do_not_fit_is_one_place_of_many():
         ]
         inside = shapely.clip_by_rect(shapely.union_all(plan), 0, 0, 2, 2)
         scene = replace(sensor(rounded_all(inside), (2.0, 2.0)), repeats=(True, True))
-        ends.append(prisms.capacitance(scene, EPS, 2e-2))
-    holds(ends[0], ends[1], 2e-2)
+        ends.append(prisms.capacitance(scene, EPS, 5e-2))
+    holds(ends[0], ends[1], 5e-2)
 
 
 @pytest.mark.parametrize("kind", [1, 2], ids=["conductor", "dielectric"])

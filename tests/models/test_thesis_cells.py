@@ -11,13 +11,13 @@ from scipy.integrate import quad
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import rect, tri
-from sensorgen.models import columns, fem2d, fem3d, thesis_cells
+from sensorgen.models import columns, fem2d, thesis_cells
 from sensorgen.scene.scene import Fill
 
 CONTACT = json.loads((Path(__file__).parents[1] / "reference" / "contact.json").read_text("utf-8"))
 
 
-@pytest.mark.parametrize("film", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("film", [0.05, 0.2])
 def test_the_corrected_formula_is_the_integral_of_vertical_columns(film):
     """3.32: eps0 dx / s(x) under hanging dielectric and under the cog, by quadrature in mm."""
     p, e = tri.Params(dielectric_mm=film), 4.68
@@ -82,19 +82,8 @@ def test_bulging_vanishes_at_rest_when_corrected():
     assert thesis_cells.bulging_f_per_m2(p, 4.68) > 1.01 * rest  # as printed it adds even at rest
 
 
-def test_a_turned_cell_keeps_the_flank_the_film_and_the_lower_triangle():
-    p = tri.Params(dielectric_mm=0.1)
-    q = thesis_cells.turned(p, 0.05)
-    flank = [(v.period_mm / 4) ** 2 + v.hang_height_mm**2 for v in (p, q)]
-    assert flank[0] == close(flank[1], 1e-12)
-    assert p.period_mm * p.dielectric_mm == close(q.period_mm * q.dielectric_mm, 1e-12)
-    assert p.period_mm * p.lower_height_mm == close(q.period_mm * q.lower_height_mm, 1e-12)
-    assert q.hang_height_mm - q.lower_height_mm < p.hang_height_mm - p.lower_height_mm
-    assert thesis_cells.turned(p, 0.0).period_mm == close(p.period_mm, 1e-12)
-
-
-@pytest.mark.parametrize("press_mm", [1e-6, 0.03, 0.2])
-@pytest.mark.parametrize("sizes", [{}, {"hang_height_mm": 1.5, "period_mm": 1.3}, {"lower_height_mm": 0.02}])
+@pytest.mark.parametrize("press_mm", [1e-6, 0.2])
+@pytest.mark.parametrize("sizes", [{}, {"hang_height_mm": 1.5, "period_mm": 1.3}])
 def test_triangles_are_turned_until_the_top_has_come_down(press_mm, sizes):
     p = tri.Params(**sizes)
     q = thesis_cells.swept(p, press_mm)
@@ -139,16 +128,6 @@ def _period(p):
     shape = tri if isinstance(p, tri.Params) else rect
     deep = 1.0 if shape is tri else p.period_mm
     return shape.scene(replace(p, length_mm=p.period_mm, width_mm=deep), Fill())
-
-
-def test_the_bulge_of_3_55_is_a_fortieth_of_the_rise():
-    """Field of strips that keep their volume, 0.05 mm down: rise of 3.55 -97.6 %, of columns on it +4.2 %."""
-    p = rect.Params(dielectric_mm=0.1)
-    q = thesis_cells.swept(p, 0.05)
-    field = [fem3d.capacitance(_period(v), EPS, 5e-3).middle() / (2 * MM) ** 2 for v in (p, q)]
-    for name, off in (("thesis-3.55", -97.6), ("thesis-3.55-corrected", -97.6), ("thesis-3.49-swept", 4.2)):
-        rest, pressed = (thesis_cells.NAMED[name].value_f_per_m2(p, 4.68, press) for press in (0.0, 0.05))
-        assert 100 * ((pressed - rest) / (field[1] - field[0]) - 1) == pytest.approx(off, abs=2.0)
 
 
 def test_what_has_no_value_is_refused():

@@ -22,7 +22,7 @@ def network(n, reach, seed=1):
     return matrix[order][:, order], rng.normal(size=(2, n))
 
 
-@pytest.mark.parametrize(("n", "reach"), [(3, 1), (40, 7), (600, 3), (600, 40)])
+@pytest.mark.parametrize(("n", "reach"), [(3, 1), (600, 40)])
 def test_a_product_is_that_of_a_dense_solve(n, reach):
     matrix, (one, other) = network(n, reach)
     found = _traxel_band.product(csr_array(matrix), one, other)

@@ -30,8 +30,7 @@ def ratio(lines, contact, ends=ENDS, area=None):
     return traxels.resistance(lines, RHO, contact, ends, area).ratio
 
 
-@pytest.mark.parametrize("degrees", [0, 15, 30, 45, 60, 75, 90])
-@pytest.mark.parametrize("layers", [1, 3])
+@pytest.mark.parametrize(("degrees", "layers"), [(0, 1), (15, 3), (45, 1), (60, 3)])
 def test_without_contact_resistance_every_direction_conducts_as_the_solid(degrees, layers):
     angles = [degrees + 90 * k for k in range(layers)]
     lines = plate(20.0, 9.24, W * 1e3, H * 1e3, angles)
@@ -129,7 +128,7 @@ def test_lines_that_do_not_meet_conduct_nothing():
         ratio(strips(12, "y"), np.inf, (-2e-3, 2e-3))
 
 
-@pytest.mark.parametrize("contact", [0.0, 1e-6, 1e-3])
+@pytest.mark.parametrize("contact", [0.0, 1e-3])
 def test_multigrid_finds_the_resistance_of_elimination(contact, monkeypatch):
     """Wide crossed layers, of some 10 000 unknowns."""
     lines = plate(30.0, 20.0, W * 1e3, H * 1e3, [0, 90, 45])
