@@ -8,14 +8,14 @@ from sensorgen.scene.scene import Body, box
 from sensorgen.solvers.electrostatics import bounds
 
 ALONG_CONES = {
-    # ends beside a corner of the tooth, whose last spoke is where it ends
-    "last spoke": plates(
+    # ends a spoke before, and lifts two of them
+    "last sector": plates(
         slab(),
         bars("tooth", "top", (0.2, 0.6, 1.0, 1.2)),
         bars("i", "bottom", (0.2, 0.55, 0.5, 0.8), (0.6, 1.2, 0.5, 0.8)),
     ),
-    # ends a spoke before, and lifts two of them
-    "last sector": plates(
+    # ends beside a corner of the tooth, whose last spoke is where it ends
+    "last spoke": plates(
         slab(), bars("tooth", "top", (0.82, 1.27, 1.06, 1.2)), bars("i", "bottom", (0.26, 1.45, 0.51, 0.69))
     ),
     # passes a corner within the dielectric on both sides of its first spoke

@@ -8,6 +8,7 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import fem2d
 from sensorgen.scene.scene import Body, box
 from sensorgen.solvers.electrostatics import bounds as _fem_bounds
+from sensorgen.solvers.electrostatics.mesh import Cones
 
 
 @pytest.mark.parametrize("film_mm", [1e-2, 1e-5])
@@ -22,9 +23,13 @@ def test_thin_films_down_to_a_nanometre(film_mm):
     assert thinner.lower > found.upper
 
 
-def test_too_thin_for_its_length_is_told():
-    """A tenth of a nanometre of air along 10 cm: triangles that doubles cannot tell from lines."""
+def test_too_thin_for_its_length_is_told(monkeypatch):
+    """A tenth of a nanometre of air along 10 cm is solved; triangles that doubles cannot tell from lines are not."""
     thin = plates(Body("x", "x60", (box(0, 100, 0, 1, 0.2, 1.2 - 1.1e-7),)), length_mm=100.0)
+    gap_mm, found = 1.2 - (1.2 - 1.1e-7), fem2d.capacitance(thin, EPS, 1e-4)
+    exact = EPS0_F_PER_M * 100 * MM / ((1 - gap_mm) / EPS["x60"] + gap_mm / EPS["air"])
+    assert found.lower <= exact <= found.upper < 1.02 * found.lower
+    monkeypatch.setattr(Cones, "areas", lambda _: np.zeros(1))
     with pytest.raises(_fem_bounds.Unsolved, match="too thin"):
         fem2d.capacitance(thin, EPS, 1e-4)
 

@@ -32,13 +32,12 @@ class Resistance:
     ----------
     ratio : float
         To a solid electrode's rho L / (H W) [-].
-    unknowns, resistors : int
+    unknowns : int
         Of the network.
     """
 
     ratio: float
     unknowns: int
-    resistors: int
 
 
 def resistance(
@@ -94,4 +93,4 @@ def resistance(
         current -= product(matrix[inner][:, inner], (matrix @ right.astype(float))[inner], leaving[inner])
     if not current > 0:
         raise OutOfRange("no line conducts from one end to the other: expected lines that meet, or a contact that does")
-    return Resistance(float(area_m2 / (resistivity_ohm_m * current)), int(free.sum()), len(conductance))
+    return Resistance(float(area_m2 / (resistivity_ohm_m * current)), int(free.sum()))

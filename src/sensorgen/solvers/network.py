@@ -212,40 +212,24 @@ class LineCrossings:
 
 
 def near(lines: StraightLines) -> tuple[Whole, Whole]:
-    """Pairs of pieces, of one layer or of neighbouring ones, that may touch; the lower number first.
+    """Pairs of pieces, of one layer or of neighbouring ones, that may touch: within two widths; the lower number first.
 
-    By squares of a few widths that both pass through.
+    Layers are drawn beside each other, so that a search in the plane finds the pairs of one layer, and, each moved on
+    by one, those with the layer above.
     """
-    side = 2.0 * float(lines.width_m.max())
-    count = np.ceil(lines.length_m() / side).astype(np.int64) + 1
-    piece = np.repeat(np.arange(len(lines)), count)
-    step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    cell = np.floor(lines.at(piece, step / (count[piece] - 1).clip(1)) / side).astype(np.int64)
-    cell -= cell.min(axis=0) - 1
-    wide, high = cell.max(axis=0) + 2
-    layer = lines.layer[piece] - lines.layer.min()
-    key = (layer * wide + cell[:, 0]) * high + cell[:, 1]
-    passing = _distinct(key * len(lines) + piece)  # sorted by square
-    within, inside = passing // len(lines), passing % len(lines)
-    begin = np.flatnonzero(np.append(True, np.diff(within) != 0))
-    square, begin, fill = within[begin], np.append(begin, len(passing)), np.diff(begin, append=len(passing))
-    pair_numbers = []
-    # Squares in a column follow each other: of one layer the next half of those around, of the layer above all of them.
-    for first, last in [(0, 1), *((n * high - 1, n * high + 1) for n in (1, wide - 1, wide, wide + 1))]:
-        low, top = np.searchsorted(square, square + first), np.searchsorted(square, square + last, "right")
-        low, n = np.repeat(begin[low], fill), np.repeat(begin[top] - begin[low], fill)
-        a = np.repeat(inside, n)
-        b = inside[np.arange(n.sum()) - np.repeat(np.cumsum(n) - n - low, n)]
-        apart = a != b
-        pair_numbers.append(_distinct(np.minimum(a, b)[apart] * len(lines) + np.maximum(a, b)[apart]))
-    pairs = _distinct(np.concatenate(pair_numbers))
-    return pairs // len(lines), pairs % len(lines)
+    import shapely
 
-
-def _distinct(numbers: Whole) -> Whole:
-    """Each number once, rising; ``np.unique`` sorts by hash tables, which takes ten times as long."""
-    rising = np.sort(numbers)
-    return np.asarray(rising[np.append(True, rising[1:] != rising[:-1])[: len(rising)]])
+    far, ends = 2.0 * float(lines.width_m.max()), np.stack([lines.start_m, lines.end_m], axis=1)
+    aside = np.zeros((len(lines), 1, 2))
+    aside[:, 0, 0] = (np.ptp(ends[..., 0]) + 2 * far) * (lines.layer - lines.layer.min())
+    above = [np.ptp(ends[..., 0]) + 2 * far, 0.0]
+    tree = shapely.STRtree(shapely.linestrings(ends + aside))
+    both = [shapely.linestrings(ends + aside + shift) for shift in (0.0, above)]
+    pairs = np.concatenate([tree.query(one, predicate="dwithin", distance=far) for one in both], axis=1)
+    low, high = np.sort(pairs[:, pairs[0] != pairs[1]], axis=0)
+    number = np.sort(low * len(lines) + high)
+    number = number[np.append(True, np.diff(number) > 0)[: len(number)]]
+    return number // len(lines), number % len(lines)
 
 
 def crossings(lines: StraightLines, pairs: tuple[Whole, Whole]) -> LineCrossings:

@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise, product
-from math import atan2, hypot, pi
+from math import atan2, dist, pi
 
 import numpy as np
 import shapely
@@ -36,6 +36,7 @@ from sensorgen.solvers.contact.element import determinant, triangle_gradients, t
 from sensorgen.solvers.contact.factors import solved_by_lu
 from sensorgen.solvers.contact.mesh import Net, TriangleMesh, nearest, of_triangles, ringed, sharp_corners, triangulated
 from sensorgen.solvers.contact.mesher import Unmeshed
+from sensorgen.solvers.electrostatics.triangles import filled
 
 Edges = Mapping[Edge, tuple[int, int]]
 
@@ -254,9 +255,9 @@ def _walked(
             first.append(on_first)
             break
         thick = min(_off(first[-1], second[-1], on_second), _off(second[-1], first[-1], on_first))
-        if thick > _THICK * min(_far(first[-1], on_first), _far(second[-1], on_second)):
+        if thick > _THICK * min(dist(first[-1], on_first), dist(second[-1], on_second)):
             break
-        shorter = _far(on_first, second[-1]) < _far(first[-1], on_second)
+        shorter = dist(on_first, second[-1]) < dist(first[-1], on_second)
         side, ahead_on = (first, on_first) if shorter else (second, on_second)
         if not _is_free(first[-1], ahead_on, second[-1], points):  # the way across would cut a side
             break
@@ -287,19 +288,7 @@ def _turn(tip: Point, a: Point, b: Point) -> float:
 
 def _off(p: Point, a: Point, b: Point) -> float:
     """Distance of p from the line through a and b."""
-    return abs((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])) / _far(a, b)
-
-
-def _far(a: Point, b: Point) -> float:
-    return hypot(a[0] - b[0], a[1] - b[1])
-
-
-def filled(ring: Sequence[int], places: Sequence[Point]) -> list[tuple[int, int, int]]:
-    """Triangles of a simple polygon, anticlockwise; its corners may lie on a line."""
-    number = {tuple(places[k]): k for k in ring}
-    triangles = shapely.constrained_delaunay_triangles(shapely.Polygon(number))
-    corners = shapely.get_coordinates(shapely.orient_polygons(shapely.get_parts(triangles))).reshape(-1, 4, 2)
-    return [(number[tuple(a)], number[tuple(b)], number[tuple(c)]) for a, b, c, _ in corners.tolist()]
+    return abs((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])) / dist(a, b)
 
 
 def _area(a: Point, b: Point, c: Point) -> float:

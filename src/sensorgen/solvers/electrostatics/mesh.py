@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sensorgen.core.arrays import Whole
 from sensorgen.scene.connections import groups
 from sensorgen.solvers.electrostatics.elimination import HELD, Numbers
-from sensorgen.solvers.electrostatics.triangles import Edge, Fan, Triangle, Triangles, edges_of, fan, fans
+from sensorgen.solvers.electrostatics.triangles import Edge, Fan, Triangle, Triangles, edges_of, fans, filled
 
 _DEGREE = 8  # of the polynomials in a sector
 _WIDEST = np.pi / 3  # of a sector
@@ -138,7 +138,7 @@ class _Splitter:
     def __init__(self, mesh: Triangles, corners: Collection[int]) -> None:
         self.mesh = mesh
         self.tipped = corners
-        self.points: list[NDArray[np.float64]] = list(mesh.points)
+        self.points: list[list[float]] = mesh.points.tolist()
         edges = dict.fromkeys(edge for corners in mesh.triangles for edge in edges_of(corners))
         lengths = {(a, b): float(np.hypot(*(mesh.points[b] - mesh.points[a]))) for a, b in edges}
         self.radius: dict[int, float] = defaultdict(lambda: np.inf)
@@ -153,7 +153,7 @@ class _Splitter:
                 here, there = mesh.points[corner], mesh.points[other]
                 for radius in self._radii(corner, length):
                     made.append(len(self.points))
-                    self.points.append(here + (there - here) * (radius / length))
+                    self.points.append((here + (there - here) * (radius / length)).tolist())
 
     def split(self) -> Triangles:
         """The finer mesh."""
@@ -168,7 +168,7 @@ class _Splitter:
                 hub += [*left, *([] if corner in self.tipped else [corner]), *right[::-1]]
                 if corner in self.tipped:
                     tips.append((corner, right[-1], left[-1]))
-            new = [*tips, *fan(np.array([self.points[n] for n in hub]), hub)]
+            new = [*tips, *filled(hub, self.points)]
             triangles += new
             regions += [region] * len(new)
         terminals: dict[Edge, str] = {}

@@ -2,13 +2,14 @@
 
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 from math import atan2, hypot
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Whole
@@ -140,14 +141,14 @@ def _all(cell: SectionCell) -> tuple[NDArray[np.float64], _Filled]:
     ends = [cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)]
     levels = [_levels(cell.slices, k) for k in range(len(ends))]
     first = np.concatenate([[0], np.cumsum([len(z) for z in levels])])
-    points = np.array([(x, z) for x, heights in zip(ends, levels, strict=True) for z in heights])
-    filled: _Filled = []
+    places = [(x, z) for x, heights in zip(ends, levels, strict=True) for z in heights]
+    points = np.array(places)
+    cut: _Filled = []
     for k, (here, share) in enumerate(zip(cell.slices, cell.shares, strict=True)):
         for band in here.bands:
             region = (f"@{band.terminal}" if band.terminal else band.material, share)
-            polygon = _corners(levels, first, k, band)
-            filled += [(corners, region) for corners in fan(points[polygon], polygon)]
-    return points, filled
+            cut += [(corners, region) for corners in filled(_corners(levels, first, k, band), places)]
+    return points, cut
 
 
 def _levels(slices: Sequence[Slice], k: int) -> list[float]:
@@ -166,31 +167,15 @@ def _corners(levels: Sequence[Sequence[float]], first: Whole, k: int, band: Band
     return [*sides[0][::-1], *sides[1]]
 
 
-def fan(places: NDArray[np.float64], polygon: list[int]) -> Iterable[Triangle]:
-    """Triangles of a convex polygon, some of whose corners may lie on a line; as few slender ones as can be.
+def filled(polygon: Sequence[int], places: Sequence[Sequence[float]]) -> list[Triangle]:
+    """Triangles of a simple polygon, some of whose corners may lie on a line; as few slender ones as can be.
 
-    Each edge takes the corner from which it looks widest (Delaunay), as long as the triangle has an area.
-    ``places`` are the corners' coordinates, ``polygon`` their numbers, counter-clockwise.
+    ``polygon`` are its corners' numbers, counter-clockwise, ``places`` the coordinates by number.
     """
-    todo = [list(range(len(polygon)))]
-    while todo:
-        ring = todo.pop()
-        if len(ring) < 3:
-            continue
-        # The corner from which the edge from the last to the first looks widest, flat triangles apart
-        corners = places[ring]
-        to_first, to_last = corners[0] - corners[1:-1], corners[-1] - corners[1:-1]
-        cross = to_last[:, 0] * to_first[:, 1] - to_last[:, 1] * to_first[:, 0]
-        dot = (to_first * to_last).sum(1)
-        angle = np.arctan2(cross, dot)
-        size = np.hypot(*to_first.T) * np.hypot(*to_last.T)
-        angle[np.abs(cross) < _FLAT * size] = -1.0
-        k = int(angle.argmax()) + 1
-        yield polygon[ring[0]], polygon[ring[k]], polygon[ring[-1]]
-        todo += [ring[: k + 1], ring[k:]]
-
-
-_FLAT = 1e-12  # sine of the angle of three corners on a line
+    number = {tuple(places[k]): k for k in polygon}
+    triangles = shapely.constrained_delaunay_triangles(shapely.Polygon(number))
+    corners = shapely.get_coordinates(shapely.orient_polygons(shapely.get_parts(triangles))).reshape(-1, 4, 2)
+    return [(number[tuple(a)], number[tuple(b)], number[tuple(c)]) for a, b, c, _ in corners.tolist()]
 
 
 _CONTACT_MM = 1e-7  # a gap below a tenth of a nanometre is contact
