@@ -6,6 +6,7 @@ It plays what is loaded into its generator: the tones are found in the waveform.
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -189,17 +190,6 @@ class _Devices:
         return iter([] if self._owner.fault == "unplugged" else [_Item(self._owner)])
 
 
-@dataclass(frozen=True)
-class _Version:
-    version: str = "simulated"
-
-
-@dataclass(frozen=True)
-class _Exceptions:
-    LibTiePieException: type[Exception] = Gone
-    ObjectGoneError: type[Exception] = Gone
-
-
 @dataclass
 class SimulatedScope:
     """The part of the module ``libtiepie`` that the driver uses, with one device, serial number 28734.
@@ -231,5 +221,6 @@ class SimulatedScope:
 
     def __post_init__(self) -> None:
         self.noise = np.random.default_rng(self.analyser.seed)
-        self.device_list, self.library, self.exceptions = _Devices(self), _Version(), _Exceptions()
+        self.device_list, self.library = _Devices(self), SimpleNamespace(version="simulated")
+        self.exceptions = SimpleNamespace(LibTiePieException=Gone, ObjectGoneError=Gone)
         self.oscilloscope, self.generator = _Oscilloscope(self), _Generator(self)

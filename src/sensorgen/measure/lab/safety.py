@@ -58,20 +58,6 @@ _FEW = 3  # readings, from which their noise can be told
 _MOST = 1 << 14  # readings of a window, whatever the rate
 
 
-def circuit(tones_hz: Real, impedance_ohm: Complex) -> str:
-    """Circuit fault of a specimen, by its (m,) impedances: "short", "open", or "".
-
-    At the lowest frequency an intact specimen is a capacitor: its reactance exceeds its resistance. At the highest,
-    where the noise of a reading is least, an open circuit has a smaller capacitance than any specimen.
-    """
-    if not np.isfinite(impedance_ohm).all():
-        return ""
-    low, high = complex(impedance_ohm[np.argmin(tones_hz)]), int(np.argmax(tones_hz))
-    if 1 / (2 * np.pi * tones_hz[high] * abs(impedance_ohm[high])) < _OPEN_F:
-        return "open"
-    return "short" if low.real > -low.imag else ""
-
-
 @dataclass
 class Watch:
     """Impedances of the last second, and what they say of specimen and instrument.
@@ -129,13 +115,20 @@ class Watch:
     def circuit(self) -> str:
         """Circuit fault of the specimen in half of the last readings: "short", "open", or "".
 
-        Clipped readings count: a short drives more current than an input takes.
+        At the lowest frequency an intact specimen is a capacitor: its reactance exceeds its resistance. At the highest,
+        where the noise of a reading is least, an open circuit has a smaller capacitance than any specimen. Clipped
+        readings count: a short drives more current than an input takes.
         """
         if len(self._course) < _FEWEST_COURSE:
             return ""
         admittance = 1 / np.array(self._course)
-        middle: Complex = np.median(admittance.view(float), axis=0).view(complex)  # of real and imaginary part
-        return circuit(self.tones_hz, np.asarray(1 / middle))
+        middle: Complex = 1 / np.median(admittance.view(float), axis=0).view(complex)  # of real and imaginary part
+        if not np.isfinite(middle).all():
+            return ""
+        low, high = complex(middle[np.argmin(self.tones_hz)]), int(np.argmax(self.tones_hz))
+        if 1 / (2 * np.pi * self.tones_hz[high] * abs(middle[high])) < _OPEN_F:
+            return "open"
+        return "short" if low.real > -low.imag else ""
 
     def mean(self) -> Complex:
         """Mean over the last second; nan of nothing [ohm]."""

@@ -186,7 +186,7 @@ class Violation:
 
 @dataclass
 class _Axis:
-    """One axis of the stage."""
+    """Way to a target at a speed, as of one axis of the stage."""
 
     at_mm: float
     target_mm: float
@@ -245,8 +245,8 @@ class VirtualRig:
         """At rest, raised."""
         self._axes: Mapping[str, _Axis] = {"x": _Axis(0.0, 0.0), "z": _Axis(20.0, 20.0)}
         self._on, self._limit_n = False, inf
-        self._sought: tuple[float, float, float] | None = None  # extension, speed, force
-        self._wanted_n = self._friction_n = self._reference_mm = self._against_n = 0.0
+        self._sought: _Axis | None = None  # where the position loop wants the piston
+        self._wanted_n = self._friction_n = self._most_n = self._against_n = 0.0
         self._press_peak_n = 0.0
         self._crept = np.zeros(len(_CREEP_S))
         self._open: dict[str, Violation] = {}
@@ -292,8 +292,8 @@ class VirtualRig:
 
         Upwards it may use all that :meth:`limit` allows.
         """
-        self._reference_mm, self._against_n = self.extension_mm, 0.0
-        self._sought = extension_mm, abs(speed_mm_s), motor_n
+        self._sought = _Axis(self.extension_mm, extension_mm, abs(speed_mm_s))
+        self._most_n, self._against_n = motor_n, 0.0
 
     def travel(self, axis: str, position_mm: float, speed_mm_s: float) -> None:
         """Begin a move of the stage along "x", or "z", which raises the actuator."""
@@ -348,18 +348,15 @@ class VirtualRig:
     def _motor(self, dt: float) -> None:
         wanted = self._wanted_n
         if self._sought is not None:
-            extension, speed, force = self._sought
-            if abs(self._reference_mm - self.extension_mm) < 1.0:
-                left = extension - self._reference_mm
-                most = speed * dt
-                self._reference_mm = extension if abs(left) <= most else self._reference_mm + copysign(most, left)
-            off = self._reference_mm - self.extension_mm
+            if abs(self._sought.at_mm - self.extension_mm) < 1.0:
+                self._sought.step(dt)
+            off = self._sought.at_mm - self.extension_mm
             if abs(off) < _NEAR_MM:
                 most = self.mechanics.friction_n + _NEAR_MM * self.mechanics.servo_n_mm
                 self._against_n = min(
                     max(self._against_n + _INTEGRAL_PER_S * self.mechanics.servo_n_mm * off * dt, -most), most
                 )
-            wanted = min(self.mechanics.servo_n_mm * off + self._against_n - self.mechanics.weight_n, force)
+            wanted = min(self.mechanics.servo_n_mm * off + self._against_n - self.mechanics.weight_n, self._most_n)
         wanted = min(max(wanted, -self._limit_n), self._limit_n) if self._on and self.fault != "power loss" else 0.0
         self.motor_n += (wanted - self.motor_n) * (1 - exp(-dt / self.mechanics.lag_s))
 
