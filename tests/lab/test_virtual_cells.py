@@ -77,6 +77,13 @@ def sides(grid):
     return np.ptp(grid.at_m[..., :2], axis=(0, 1))
 
 
+def at_rest(scene, size_mm, most):
+    """Capacitance of a scene, of bricks without size."""
+    grids = [bricks(scene, NUMBERS, size_mm, most, n) for n in (1, 2)]
+    times = scene.size_mm[0] * scene.size_mm[1] * 1e-6 / sides(grids[0]).prod()
+    return times * extrapolated(*(capacitance(of, EPS, of.at_m) for of in grids))
+
+
 def quarter():
     """Of a cell of rect as drawn: from the middle of a conductor's strip to that of a dielectric's, both ways."""
     whole = rect_cell(0.2)
@@ -200,10 +207,13 @@ def test_bricks_at_rest_lie_between_certified_bounds(design):
 
     scene = printed.body(make(design)).cell.scene
     bounds = next(fem3d.steps(scene, {"x60": 4.68, "air": 1.00059})).interval
-    grids = [bricks(scene, NUMBERS, 0.07, 5500, n) for n in (1, 2)]
-    times = scene.size_mm[0] * scene.size_mm[1] * 1e-6 / sides(grids[0]).prod()
-    found = times * extrapolated(*(capacitance(of, EPS, of.at_m) for of in grids))
-    assert bounds.lower * 0.999 < found < bounds.upper * 1.001
+    assert bounds.lower * 0.999 < at_rest(scene, 0.07, 5500) < bounds.upper * 1.001
+
+
+def test_a_blank_has_the_capacitance_of_its_cells_over_its_length(coarse):
+    cells = printed.body(make(RECT)).cell
+    expected = at_rest(cells.scene, 0.175, 500) * cells.count / 0.1
+    assert coarse(make(RECT)).capacitance_f_per_m(0.0) == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.nightly
