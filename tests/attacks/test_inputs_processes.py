@@ -61,13 +61,6 @@ def running(pid):
     return state(pid)[0] not in ("", "Z")
 
 
-def started(words, cwd, env=None):
-    return subprocess.Popen(
-        [sys.executable, "-m", "sensorgen", *words], cwd=cwd, env={**os.environ, **(env or {})},
-        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
-
-
 WORK = """
 import math, time
 from sensorgen.core.parallel import in_parallel
@@ -102,11 +95,11 @@ def test_a_slicer_and_what_it_started_end_with_a_parent_that_is_killed(tmp_path)
         f"sleep 600 &\necho $! > {tmp_path}/pid\nsleep 600\n"
     )
     slicer.chmod(slicer.stat().st_mode | stat.S_IXUSR)
-    process = started(
-        ("slice", "tri", "--length", "6", "--force"),
-        tmp_path,
-        {"PATH": f"{slicer.parent}{os.pathsep}{os.environ['PATH']}"},
-    )
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sensorgen", "slice", "tri", "--length", "6", "--force"], cwd=tmp_path,
+        env={**os.environ, "PATH": f"{slicer.parent}{os.pathsep}{os.environ['PATH']}"},
+        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
     try:
         assert waiting((tmp_path / "pid").exists)
         children = [*below(process.pid), int((tmp_path / "pid").read_text())]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from sensorgen.core.errors import BadInput, UnknownName, Unwritable
-from sensorgen.measure.log import Batch, BenchRun, Log, Prediction, Print, RawFile, Reading, database, verify
+from sensorgen.measure.log import Batch, BenchRun, Log, Prediction, Print, RawFile, Reading, database, listing, verify
 from sensorgen.measure.log.entries import ROWS, DesignRow, Withdrawal
 from sensorgen.measure.log.notes import reading
 
@@ -105,6 +105,13 @@ def test_a_correction_is_a_new_row_and_the_old_one_stays(log):
     with pytest.raises(BadInput, match="nothing to correct: no row 'nobody'"):
         log.add([reading("23 triX", "0.7k", supersedes="nobody")])
     assert len(log.readings(superseded=True)) == 2
+
+
+def test_a_list_of_many_recordings_says_that_it_is_cut(log):
+    runs = [BenchRun(uid=uid, specimen="26 triX", written="26 triX", file=SHA) for uid in "ab"]
+    log.add([RawFile(uid=SHA, name="run.mat", size=3), *runs])
+    cut, whole = (listing.listing(log, last=last) for last in (2, 3))
+    assert ["the latest 2 are shown; --all shows all" in each.notes for each in (cut, whole)] == [True, False]
 
 
 def test_all_rows_of_one_call_or_none(log):

@@ -174,22 +174,6 @@ def test_withdrawing_the_correction_that_counts_lets_the_other_one_count(machine
     assert sound(a, b)
 
 
-def test_a_log_that_was_copied_and_used_twice(machines, tmp_path):
-    """Both copies go on from the same record: a fork, which a sync joins."""
-    a, *_ = machines
-    a.add(thesis_readings()[:5])
-    a.pragma("wal_checkpoint(TRUNCATE)")
-    shutil.copy(a.path, tmp_path / "copy.db")
-    with Log(tmp_path / "copy.db") as copy:
-        a.add([reading("23 triX", "1")])
-        copy.add([reading("23 triX", "2")])
-        for log in (a, copy, a):
-            sync.sync(log, tmp_path / "share")
-        assert ids(a) == ids(copy)
-        assert a.count(Reading) == copy.count(Reading) == 7
-        assert sound(a, copy)
-
-
 def test_the_file_alone_has_everything_that_was_acknowledged(log, path, tmp_path):
     """While a program holds the log open, somebody copies the file without its write-ahead log."""
     for k in range(20):

@@ -70,7 +70,8 @@ def listing(log: Log, iteration: int | None = None, last: int | None = None) -> 
     readings, recordings = log.readings(last=last, **wanted), log.recordings(last=last, **wanted)
     names = {Reading: "readings", BenchRun: "recordings", Prediction: "predictions"}
     total = ", ".join(f"{log.count(kind)} {name}" for kind, name in names.items())
-    more = [f"the latest {last} are shown; --all shows all"] if last is not None and len(readings) >= last else []
+    cut = last is not None and max(len(readings), len(recordings)) >= last
+    more = [f"the latest {last} are shown; --all shows all"] if cut else []
     records, head = log.head()
     chain = [f"{records} records, head {head[:16]}"] if records else []
     return Listing(readings, recordings, (*log.conflicts(), total, *more, *chain, str(log.path)))
