@@ -4,8 +4,8 @@ import fuzz
 import pytest
 
 COUNTS = {
-    "mat": 60, "packed": 30, "hdf5": 30, "csv": 30, "rig": 30, "table": 60, "words": 60, "parquet": 60, "batch": 60,
-    "db": 60, "gcode": 20, "printer": 30, "plan": 20, "design": 20,
+    "mat": 40, "packed": 15, "hdf5": 20, "csv": 20, "rig": 20, "table": 30, "words": 30, "parquet": 30, "batch": 30,
+    "db": 30, "gcode": 20, "printer": 30, "plan": 20, "design": 20,
 }  # fmt: skip
 
 
