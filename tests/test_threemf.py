@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
-from sensorgen.export.threemf import FAMILIES, Part, content
+from sensorgen.export.threemf import FAMILIES, Part, content, core
 from sensorgen.scene import scene
 from sensorgen.scene.geometry.meshes import Mesh, mesh
 from sensorgen.scene.scene import Body
@@ -156,9 +156,9 @@ class TestEveryFamily:
         assert b'<vertex x="0" y="0.3" z="0"/>' in text["3D/3dmodel.model"]
 
 
-def test_more_rows_than_are_written_at_once():
-    mesh = box((0, 0, 0), (1, 1, 1))
-    copies = 3000  # 36,000 triangles, over one chunk
+def test_more_rows_than_are_written_at_once(monkeypatch):
+    monkeypatch.setattr(core, "_ROWS", 1 << 10)
+    mesh, copies = box((0, 0, 0), (1, 1, 1)), 300  # 3600 triangles, over three chunks
     offsets = (8 * np.arange(copies, dtype=np.int32)).repeat(12)[:, None]
     far = np.repeat(np.arange(copies), 8)[:, None] * [2.0, 0, 0]
     many = Mesh(np.tile(mesh.vertices_mm, (copies, 1)) + far, np.tile(mesh.triangles, (copies, 1)) + offsets)

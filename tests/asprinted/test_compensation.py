@@ -217,7 +217,7 @@ def test_a_named_design_gets_a_name_of_its_own():
 def test_what_cannot_be_had_is_refused_with_the_nearest(monkeypatch, shared_cache):
     """After fewer tries than usual."""
     monkeypatch.setattr(compensation, "_MOST_TRIED", 30)
-    monkeypatch.setattr(compensation, "_MOST_SOLVED", 4)
+    monkeypatch.setattr(compensation, "_MOST_SOLVED", 2)
     asked = small(parameters={"dielectric_mm": 0.3, "hang_height_mm": 3.0, "length_mm": 6.0, "width_mm": 4.0})
     with pytest.raises(OutOfRange, match=r"cannot be printed of .*; nearest: "):
         compensated(asked, "classic")
