@@ -338,8 +338,8 @@ def from_json(data: Any) -> Experiment:
         raise BadInput(f"the journal's experiment is damaged: {problem(error, data)}") from None
 
 
-def check(experiment: Experiment, length_mm: float, seconds: float) -> None:
-    """Cross checks that need the specimen's length and the plan's, before anything moves.
+def check(experiment: Experiment, length_mm: float) -> None:
+    """Cross checks that need the specimen's length, before anything moves.
 
     Parameters
     ----------
@@ -347,14 +347,12 @@ def check(experiment: Experiment, length_mm: float, seconds: float) -> None:
         What was read.
     length_mm : float
         Of the specimen [mm].
-    seconds : float
-        How long the plan is expected to take [s].
 
     Raises
     ------
     OutOfRange
-        A tip longer than the specimen, a force above the limit, a place beyond the specimen or the stage's travel, a
-        span that falls, or a plan that takes too long; the message names the key.
+        A tip longer than the specimen, a force above the limit, a place beyond the specimen or the stage's travel, or a
+        span that falls; the message names the key.
     """
     tip, limits, approach = experiment.pressing, experiment.limits, experiment.approach
     if tip.length_mm > length_mm:
@@ -375,11 +373,6 @@ def check(experiment: Experiment, length_mm: float, seconds: float) -> None:
         _inside("approach.place_mm", approach.place_mm, (low, high))
     for k, part in enumerate(experiment.plan):
         _check_part(f"plan.{k}.{part.kind}", part.content, limits.force_n, (low, high))
-    if seconds > limits.hours * 3600:
-        raise OutOfRange(
-            f"plan: takes about {seconds / 3600:.3g} h, limits.hours is {limits.hours:g}; expected fewer presses, "
-            "shorter holds, or a larger limit"
-        )
 
 
 def _check_part(key: str, part: Kind, limit_n: float, places_mm: tuple[float, float]) -> None:

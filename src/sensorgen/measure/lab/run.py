@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.document import Facts, Part
-from sensorgen.core.errors import BadInput, SensorgenError, within
+from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, within
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design, load, make
 from sensorgen.measure.lab import experiment as experiments
@@ -130,17 +130,22 @@ def planned(experiment: Experiment, log: Log | None = None) -> PlannedRun:
     Raises
     ------
     SensorgenError
-        What :func:`sensorgen.measure.lab.experiment.check` refuses; a specimen whose name the log does not take.
+        What :func:`sensorgen.measure.lab.experiment.check` refuses; a plan that takes too long; a specimen whose name
+        the log does not take.
     """
     with within("specimen"):
         notes.named(experiment.specimen, log)
     design = None if experiment.length_mm else design_of(experiment, log)
     length = experiment.length_mm or (float(design.params.length_mm) if design else USUAL_MM)
-    experiments.check(experiment, length, 0.0)  # its places, before presses are made of them
+    experiments.check(experiment, length)
     steps = experiments.steps(experiment, length)
     holds = [part.content.hold_s[1] for part in experiment.plan if isinstance(part.content, Next)]
-    seconds = experiments.seconds(steps, max(holds, default=0.0))
-    experiments.check(experiment, length, seconds)
+    seconds, hours = experiments.seconds(steps, max(holds, default=0.0)), experiment.limits.hours
+    if seconds > hours * 3600:
+        raise OutOfRange(
+            f"plan: takes about {seconds / 3600:.3g} h, limits.hours is {hours:g}; expected fewer presses, shorter "
+            "holds, or a larger limit"
+        )
     return PlannedRun(experiment, length, tuple(steps), seconds)
 
 
