@@ -1,14 +1,14 @@
-"""The next-best press: its expected covariance by another way, what it chooses, and how many presses it saves."""
+"""The next-best press: its expected covariance by another way, and what it chooses."""
 
 import numpy as np
 import pytest
 
 from sensorgen.core.errors import BadInput
-from sensorgen.prediction.calibration.fitting import Data, calibrated, covariances, prior
+from sensorgen.prediction.calibration.fitting import Data, covariances, prior
 from sensorgen.prediction.calibration.next_press import VALUES, NextPress, PossiblePresses
 from sensorgen.prediction.calibration.specimen import Presses
-from virtual_specimen import LENGTH_M, drawn, measured, session
-from virtual_specimen.adapter import data, specimen_model
+from virtual_specimen import LENGTH_M
+from virtual_specimen.adapter import specimen_model
 
 NOISE = np.full(7, 1e-3)
 EVERYWHERE = PossiblePresses((0.1, 6.0), (2.5e-3, LENGTH_M - 2.5e-3), (0.3, 30.0))
@@ -51,33 +51,6 @@ def test_a_press_after_a_higher_one_ends_where_the_range_ends(model):
     assert set(np.round(peak[tried.unloading > 0], 9)) == {6.0}
     assert tried.force_n.min() == pytest.approx(0.1)
     assert [tried.position_m.min(), tried.position_m.max()] == pytest.approx(EVERYWHERE.position_m)
-
-
-def chosen(model, truth, count):
-    """Calibration by chosen presses."""
-    first = data(session(truth, 1, 0), truth)
-    known, rng = first.rows(np.arange(0)), np.random.default_rng(0)
-    chooser = NextPress(model, EVERYWHERE, first.noise[0])
-    for _ in range(count):
-        p = chooser.best(calibrated(model, known))
-        one = data(measured(truth, *(np.array([v]) for v in (p.force_n, p.position_m, p.peak_n, p.hold_s)), rng), truth)
-        columns = zip(vars(known.presses).values(), vars(one.presses).values(), strict=True)
-        known = Data(
-            Presses(*map(np.concatenate, columns)), np.concatenate([known.ratio, one.ratio]),
-            np.concatenate([known.noise, one.noise]), known.rest, known.rest_noise,
-        )  # fmt: skip
-    return calibrated(model, known)
-
-
-@pytest.mark.nightly
-def test_a_third_of_the_presses_is_enough(model):
-    """Median of specimens with all errors at once: 6 chosen presses against 18 random ones."""
-    saved = []
-    for seed in range(3):
-        truth = drawn(seed)
-        by_chance = calibrated(model, data(session(truth, 18, seed, EVERYWHERE.force_n), truth))
-        saved.append(spread(model, by_chance) - spread(model, chosen(model, truth, 6)))
-    assert np.median(saved) > 0
 
 
 @pytest.mark.parametrize("wrong", [

@@ -1,10 +1,10 @@
-"""Types of arrays, and records of columns."""
+"""Types of arrays, records of columns, and numbers as JSON has them."""
 
 from dataclasses import dataclass, fields, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -30,3 +30,12 @@ def parts_of(count: Whole) -> tuple[Whole, Whole]:
     """
     which = np.repeat(np.arange(len(count)), count)
     return which, np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+
+
+def finite(values: ArrayLike) -> Any:
+    """A number or lists of numbers, None where one is not finite.
+
+    >>> finite([[1.0, np.nan], [np.inf, 2.0]]), finite(np.float64(3.0))
+    ([[1.0, None], [None, 2.0]], 3.0)
+    """
+    return np.where(np.isfinite(values), values, np.array(None)).tolist()

@@ -5,12 +5,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
-from math import inf, isfinite, nan
+from math import inf, nan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.core.arrays import Real
+from sensorgen.core.arrays import Real, finite
 from sensorgen.core.bounds import Interval
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
@@ -542,7 +542,7 @@ def _assumed(design: Design) -> Iterator[str]:
 
 def _known(values: Real) -> tuple[float | None, ...]:
     """Values as JSON holds them: None where one is not finite."""
-    return tuple(value if isfinite(value) else None for value in values.tolist())
+    return tuple(finite(values))
 
 
 def _closed_form(body: Body, asked: PressQuestion, model: str) -> CompressionResult:

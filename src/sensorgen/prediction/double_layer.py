@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sensorgen.core.arrays import Complex, Real
+from sensorgen.core.arrays import Complex, Real, finite
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
@@ -218,9 +218,7 @@ def _errors(slopes: Complex, noise: Real, drift: float) -> tuple[DriftErrors, Dr
     known = standard_errors(slopes[:2], noise)
     aware = np.concatenate([slopes, np.array([[0.0], [0.0], [1.0]])], axis=1)
     drifting = standard_errors(aware, np.append(noise, drift))
-    force, position = (
-        DriftErrors(*(float(v) if np.isfinite(v) else None for v in (known[k], drifting[k]))) for k in (0, 1)
-    )
+    force, position = (DriftErrors(*finite([known[k], drifting[k]])) for k in (0, 1))
     return force, position
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sensorgen.core.arrays import Complex, Mask, Real, Whole
+from sensorgen.core.arrays import Complex, Mask, Real, Whole, finite
 from sensorgen.core.document import Column, Facts, Part, Table, comma_separated, to_json
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
@@ -208,7 +208,7 @@ class PressureMaps:
     def regional(self, k: int) -> Table:
         """Force, mean and peak pressure and area of contact of each region in a frame."""
         rows = (
-            (name, *(_cell(float(f"{self.regions[f'{name}_{c.key}'][k]:.4g}")) for c in _REGION))
+            (name, *finite([float(f"{self.regions[f'{name}_{c.key}'][k]:.4g}") for c in _REGION]))
             for name in self.model.regions
         )
         return Table("regions", "", (Column("region"), *_REGION), tuple(rows))
@@ -225,7 +225,7 @@ class PressureMaps:
         )  # fmt: skip
         dark = (np.isnan(self.pressure_kpa) & self.model.here).sum((1, 2))
         found = (self.time_s, force, sigma, x, y, self.area_mm2, self.peak_kpa, dark, *errors, *self.regions.values())
-        return Table("frames", "", columns, tuple(tuple(map(_cell, row)) for row in np.stack(found, 1).tolist()))
+        return Table("frames", "", columns, tuple(map(tuple, finite(np.stack(found, 1)))))
 
     def heaviest(self) -> int:
         """Number of the frame with the largest force."""
@@ -695,10 +695,6 @@ def _named(which: Mask) -> str:
     """First crossings of some."""
     first = np.argwhere(which).tolist()
     return ", ".join(f"r{i + 1}c{j + 1}" for i, j in first[:_SHOWN]) + (", ..." if len(first) > _SHOWN else "")
-
-
-def _cell(value: float) -> float | None:
-    return None if value != value else value
 
 
 def _known(sigma_pa: Real) -> Mask:

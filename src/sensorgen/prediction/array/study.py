@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sensorgen.core.arrays import Mask, Real
+from sensorgen.core.arrays import Mask, Real, finite
 from sensorgen.core.document import Cell, Column, Facts, Part, Table, to_json
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM, si
@@ -232,10 +232,10 @@ class ArrayStudy:
         yield from self.model.shared()
         yield from self.model.beyond(np.array([self.pressure_kpa]))
         if self.crosstalk is not None:
-            finite = self.crosstalk[self.determined]
+            shares = self.crosstalk[self.determined]
             yield (
-                f"crosstalk: another crossing changes a reading by at most {finite.max():.2g} of what its own does "
-                f"(median {np.median(finite):.2g})"
+                f"crosstalk: another crossing changes a reading by at most {shares.max():.2g} of what its own does "
+                f"(median {np.median(shares):.2g})"
             )
         if self.model.here.size > readouts.MOST_DENSE:
             most = readouts.MOST_DENSE
@@ -254,10 +254,10 @@ class ArrayStudy:
             "load_factor": self.model.load_factor,
             "pressure_kpa": self.pressure_kpa,
             "shared_factor": self.model.shared_factor,
-            "sigma_kpa": _map(np.where(self.determined, self.sigma_kpa, np.nan)),
-            "sigma_n": _map(np.where(self.determined, self.sigma_n, np.nan)),
-            "crosstalk": None if self.crosstalk is None else _map(self.crosstalk),
-            "apart_mm": self.apart_mm if np.isfinite(self.apart_mm) else None,
+            "sigma_kpa": finite(np.where(self.determined, self.sigma_kpa, np.nan)),
+            "sigma_n": finite(np.where(self.determined, self.sigma_n, np.nan)),
+            "crosstalk": None if self.crosstalk is None else finite(self.crosstalk),
+            "apart_mm": finite(self.apart_mm),
             "frames_per_s": 1 / self.readout.frame_s(self.model),
             "faults": self.faults,
             "notes": self.notes,
@@ -308,7 +308,3 @@ def study(
         model, readout, pressure_kpa, np.where(model.here, sigma, np.nan),
         readouts.crosstalk(read[0]) if small else None, tuple(faults), distance_mm(model, known * per_pa**2), short,
     )  # fmt: skip
-
-
-def _map(values: Real) -> list[list[float | None]]:
-    return [[float(v) if np.isfinite(v) else None for v in row] for row in values.tolist()]

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.core.arrays import Complex, Mask, Real, finite
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import refusal
 from sensorgen.models.sensor import Response, Sensor
 from sensorgen.prediction.identifiability import results
-from sensorgen.prediction.identifiability.results import GUESS, finite, metres, newtons
+from sensorgen.prediction.identifiability.results import GUESS, metres, newtons
 from sensorgen.prediction.inference import cramer_rao, orthogonal
 
 HIGHEST_HZ = 1e6  # assumed of the bridge; its oscilloscope (TiePie HS5-540) reaches far more

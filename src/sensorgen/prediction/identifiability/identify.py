@@ -10,14 +10,14 @@ from functools import reduce
 
 import numpy as np
 
-from sensorgen.core.arrays import Real
+from sensorgen.core.arrays import Real, finite
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import compression
 from sensorgen.models.compression import Plate
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.identifiability import fisher, results
 from sensorgen.prediction.identifiability.fisher import LeastErrors, Required, Setup, spread, standard_errors
-from sensorgen.prediction.identifiability.results import cartesian, finite
+from sensorgen.prediction.identifiability.results import cartesian
 from sensorgen.prediction.query import FORCE_N, NOISE
 
 SHOWN = 3
@@ -337,9 +337,7 @@ def _map(setup: Setup, need: fisher.Required) -> results.ErrorMap:
     place = np.linspace(0.0, setup.sensor.length_m, MAP_POSITIONS)
     limits = surface(setup, force, place)
     pressed = force != 0
-    rows_n, rows_m = (
-        tuple(tuple(finite(value) for value in row) for row in sigma) for sigma in (limits.force_n, limits.position_m)
-    )
+    rows_n, rows_m = (tuple(map(tuple, finite(sigma))) for sigma in (limits.force_n, limits.position_m))
     doubt = setup.sensor.compression.doubt(float(setup.sensor.stress_pa(force[:, None], place).max()))
     summaries = (
         _summary(sigma[pressed], serves, force[pressed], place)

@@ -381,11 +381,6 @@ def _text(value: "Real | None", units: dict[str, float], beyond: str) -> str:
     return f"more than 1 {beyond}"
 
 
-def finite(value: "Real") -> float | None:
-    """A number, None for nan."""
-    return None if isnan(value) else float(value)
-
-
 def cartesian(value: complex) -> Cartesian:
     """A complex number as data."""
     return Cartesian(float(value.real), float(value.imag))
