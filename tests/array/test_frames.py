@@ -310,12 +310,12 @@ def test_the_error_of_the_total_force_counts_what_errors_of_crossings_share(mode
         lead_ohm=tuple(ohm * each for each in model.lead_ohm),
     )  # fmt: skip
     readout, draw = ArrayReadout(kind), np.random.default_rng(3)
-    exact = frames_of(model, readout, ohm=ohm, pressures_pa=PRESSURE[:1])[2:].repeat((50, 200), axis=0)
+    exact = frames_of(model, readout, ohm=ohm, pressures_pa=PRESSURE[:1])[2:].repeat((50, 120), axis=0)
     noise = readout.noise * np.abs(exact) * (draw.normal(size=exact.shape) + 1j * draw.normal(size=exact.shape))
-    found = inverted(resistive, readout, exact + noise, np.arange(250) < 50, np.arange(250.0), scatter=0.0)
+    found = inverted(resistive, readout, exact + noise, np.arange(170) < 50, np.arange(170.0), scatter=0.0)
     assert found.by.startswith("the network")
     force, error = found.force_n
-    assert error.mean() == pytest.approx(force.std(), rel=0.15)
+    assert error.mean() == pytest.approx(force.std(), rel=0.2)
 
 
 def test_readings_of_no_capacitance_are_no_numbers(model):
@@ -351,13 +351,12 @@ def test_what_does_not_settle_is_counted(model, monkeypatch):
     assert f"{dark} values left out that 1 steps" in found.by
 
 
-@pytest.mark.parametrize("noise_s", [1e-9, 3e-7])
-def test_not_determined_is_one_thing_here_and_in_a_study(model, noise_s):
-    readout, flat = ArrayReadout(noise=0.0, noise_s=noise_s), np.full((1, 5, 6), 1e3)
+def test_not_determined_is_one_thing_here_and_in_a_study(model):
+    readout, flat = ArrayReadout(noise=0.0, noise_s=3e-7), np.full((1, 5, 6), 1e3)
     known = study(model, readout, 1.0).determined
     found = maps(model, readout, frames_of(model, readout, pressures_pa=flat))
     assert np.isfinite(found.pressure_kpa[0]).tolist() == known.tolist()
-    assert known.all() == (noise_s < 1e-8)
+    assert not known.all()
 
 
 def test_frames_settle_beside_a_loose_track_at_a_high_frequency():
