@@ -11,6 +11,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import skfem
+from expected import stairs
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 from skfem.helpers import dot, grad
@@ -22,7 +23,7 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import tri
 from sensorgen.models import columns, fem2d
 from sensorgen.scene.repetition import cell
-from sensorgen.scene.scene import Body, Fill, Scene, box
+from sensorgen.scene.scene import Fill, Scene
 from sensorgen.scene.sections import sections
 from sensorgen.solvers.electrostatics.mesh import Cones
 from sensorgen.solvers.electrostatics.plane import Plane
@@ -41,15 +42,6 @@ BLUE, ORANGE, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "0.45"
 def tri_scene(film_mm: float) -> Scene:
     """One period, 1 mm deep."""
     return tri.scene(tri.Params(length_mm=2.0, width_mm=1.0, dielectric_mm=film_mm), Fill())
-
-
-def stairs() -> Scene:
-    """A cog printed in three layers, over a film: right angles only."""
-    cog = tuple(box(0, 0.5 * (k + 1) / 3, 0, 1, 0.5 + 0.4 * k / 3, 0.5 + 0.4 * (k + 1) / 3) for k in range(3))
-    low = Body("low", "etpu", (box(0, 2, 0, 1, 0, 0.3),), "bottom")
-    film = Body("film", "x60", (box(0, 2, 0, 1, 0.3, 0.4),))
-    top = Body("top", "etpu", (*cog, box(0, 2, 0, 1, 0.9, 1.2)), "top")
-    return Scene((low, film, top), (2.0, 1.0, 1.2))
 
 
 def uniform(scene: Scene, element: skfem.Element, refinements: int) -> Iterator[tuple[int, float]]:
@@ -215,7 +207,7 @@ def _voxels(scene: Scene, layers: int, side: int) -> tuple[np.ndarray, np.ndarra
 def ratios() -> None:
     """Width of the interval over the ratio of permittivities, 1e-4 asked for."""
     values = np.geomspace(1, 1e6, 19)
-    scenes = {"triangular cell, air wedges at the apex": (tri_scene(0.1), ORANGE), "cog in layers": (stairs(), BLUE)}
+    scenes = {"triangular cell, air wedges at the apex": (tri_scene(0.1), ORANGE), "cog in layers": (stairs(3), BLUE)}
     figure, axis = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
     for label, (scene, colour) in scenes.items():
         for name, style, widths in (
