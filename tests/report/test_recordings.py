@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import pytest
 
 from sensorgen.analysis.report.recordings import ImpedanceRow, findings, headline
-from sensorgen.core.document import Table
 
 ROW = ImpedanceRow(
     "S1, recording 1", "tri", 1100.0, 3000.0, 10.0, 2900.0, 1500.0, 4000.0, -2e6, 100.0, -2e6, -2.2e6, -1.8e6,
@@ -14,12 +13,8 @@ ROW = ImpedanceRow(
 )  # fmt: skip
 
 
-def table(*rows):
-    return Table.of("impedance", "", rows)
-
-
 def said(*rows):
-    return " ".join(findings([SimpleNamespace(name="S1, recording 1", pairs=object())], table(*rows)))
+    return " ".join(findings([SimpleNamespace(name="S1, recording 1", pairs=object())], rows))
 
 
 @pytest.mark.parametrize(("changes", "flagged"), [
@@ -35,7 +30,7 @@ def test_what_is_outside_its_predicted_range_is_flagged(changes, flagged):
 
 def test_the_headline_says_what_is_simulated():
     own, made = ROW, replace(ROW, recording="S1, recording 2, simulated")
-    assert "measured 0 % of" in next(headline(table(own)))
-    assert "simulated 0 % of" in next(headline(table(made)))
+    assert "measured 0 % of" in next(headline([own]))
+    assert "simulated 0 % of" in next(headline([made]))
     said = "measured 0 % of |Z| off the prediction (median of 2 frequencies in 2 recordings, 1 of them simulated)"
-    assert said in next(headline(table(own, made)))
+    assert said in next(headline([own, made]))

@@ -200,7 +200,7 @@ class _ReportData:
     comparison: Comparison
     recorded: Sequence[RecordedRun]
     explanations: Sequence[explained.Explanation]
-    impedances: Table | None
+    impedances: Sequence[recordings.ImpedanceRow]
     ac: Sequence[alternating.AcRow]
     changes: Sequence[history.HistoryRow]
     calibrated: "Sequence[Calibration]"
@@ -213,7 +213,7 @@ def _data(
     calibrated = history.latest(log, _specimens(comparison, recorded), left_out)
     own = {one.specimen for one in calibrated}  # a calibration explains more of its recordings than one parameter can
     explanations = explained.explanations(comparison, [run for run in recorded if run.entry.specimen not in own])
-    impedances = recordings.impedances(recorded, comparison) if recorded else None
+    impedances = recordings.impedances(recorded, comparison)
     ac = alternating.rows(comparison)
     changes = history.rows(comparison, ac)
     return _ReportData(comparison, recorded, explanations, impedances, ac, changes, calibrated, left_out)
@@ -275,7 +275,7 @@ def _sections(log: Log, data: _ReportData) -> Iterator[PageSection]:
     notes = yamlfile.read(Path(__file__).with_name("notes.yaml"))
     told: dict[str, Any] = {} if brief else notes
     direct = [electrodes.readings(comparison)] if comparison.direct else []
-    at_rest = [data.impedances] if data.impedances else []
+    at_rest = Table.some("impedance", "Impedance at rest and its prediction, by frequency", data.impedances)
     figures = (*electrodes.figures(comparison), *recordings.residuals(data.impedances))
     parts = (*direct, *at_rest, *(told.get("measured", ()) if direct else ()))
     yield PageSection("measured", "Measured and predicted", figures, parts)

@@ -66,7 +66,7 @@ class RecordingRow:
     notes: Annotated[str, Column("notes")]
 
 
-def impedances(recorded: Sequence[RecordedRun], comparison: Comparison) -> Table:
+def impedances(recorded: Sequence[RecordedRun], comparison: Comparison) -> list[ImpedanceRow]:
     """Impedance at rest, frequency by frequency, and its prediction."""
     rows: list[ImpedanceRow] = []
     for run in recorded:
@@ -85,7 +85,7 @@ def impedances(recorded: Sequence[RecordedRun], comparison: Comparison) -> Table
                 float(z.imag), float(error.imag), *_predicted(im), *off, 100 * share, verdict(complex(z)),
                 float(-1 / (2 * pi * f * z.imag)) / F_PER_PF, *c_pf,
             ))  # fmt: skip
-    return Table.of("impedance", "Impedance at rest and its prediction, by frequency", rows)
+    return rows
 
 
 def _residual(z_ohm: complex, expected: Impedance | None) -> tuple[float | None, float | None]:
@@ -113,11 +113,10 @@ def facts(recorded: Sequence[RecordedRun]) -> tuple[Table, ...]:
     return Table.some("recordings", "Recordings of the rig", rows)
 
 
-def headline(table: Table | None) -> Iterator[str]:
+def headline(impedances: Sequence[ImpedanceRow]) -> Iterator[str]:
     """Measured impedance against the predicted one, in one sentence."""
-    rows = [row for row in table.rows if row.r_residual is not None] if table else []
-    if rows:
-        off = float(np.median([hypot(row.r_residual, row.x_residual) for row in rows]))
+    if rows := _compared(impedances):
+        off = float(np.median(np.hypot(*np.array([(row.r_residual, row.x_residual) for row in rows], float).T)))
         names = {row.recording for row in rows}
         simulated = sum(name.endswith(", simulated") for name in names)
         kind = "simulated" if simulated == len(names) else "measured"
@@ -128,9 +127,13 @@ def headline(table: Table | None) -> Iterator[str]:
         )
 
 
-def findings(recorded: Sequence[RecordedRun], table: Table | None) -> Iterator[str]:
+def _compared(rows: Sequence[ImpedanceRow]) -> list[ImpedanceRow]:
+    """Rows with a prediction."""
+    return [row for row in rows if row.r_residual is not None]
+
+
+def findings(recorded: Sequence[RecordedRun], rows: Sequence[ImpedanceRow]) -> Iterator[str]:
     """Impedance, noise and capacitance of recordings at rest; verdicts; what cannot be, or was not expected."""
-    rows: Sequence[ImpedanceRow] = table.rows if table else ()
     for run in recorded:
         mine = [row for row in rows if row.recording == run.name]
         verdicts = {row.frequency_hz: row.verdict for row in mine}
@@ -165,17 +168,17 @@ def _outside(rows: Sequence[ImpedanceRow], part: str) -> Iterator[str]:
             yield at_text(row.frequency_hz)
 
 
-def residuals(table: Table | None) -> Iterator[Figure]:
+def residuals(impedances: Sequence[ImpedanceRow]) -> Iterator[Figure]:
     """Of R and X, relative to the prediction's magnitude."""
-    rows = [row for row in table.rows if row.r_residual is not None] if table else []
+    rows = _compared(impedances)
     if not rows:
         return
     x, names = [row.frequency_hz for row in rows], [row.recording for row in rows]
+    both = np.array([(row.r_residual, row.x_residual) for row in rows], float).T.tolist()
     panels = tuple(
         Panel((Curve("points", "", x, values, text=names, colour=colour),), Axis("frequency [Hz]", log=True),
               Axis(f"residual of {part} / |Z|"))
-        for part, values, colour in (("R", [row.r_residual for row in rows], BLUE),
-                                     ("X", [row.x_residual for row in rows], ORANGE))
+        for part, values, colour in zip("RX", both, (BLUE, ORANGE), strict=True)
     )  # fmt: skip
     yield Figure(
         "impedance-residuals", "Impedance at rest: measured - predicted",
