@@ -37,6 +37,26 @@ def values(text: str) -> dict[str, str]:
 # --- loads ------------------------------------------------------------------------------------------------
 
 
+ETPU = materials.load("etpu")
+COLDER = {3: ToolLoad(ETPU), 4: ToolLoad(changed("x60", bed_temperature_c=60.0))}
+
+
+@pytest.mark.parametrize(
+    ("loads", "error", "says"),
+    [
+        ({}, BadInput, "no tool is loaded"),
+        ({6: ToolLoad(ETPU)}, BadInput, r"no tool 6; its tools are \[1, 2, 3, 4, 5\]"),
+        ({3: ToolLoad(ETPU, infill_percent=0)}, OutOfRange, r"infill \[%\] is 0; expected 1 to 100"),
+        ({3: ToolLoad(ETPU, infill_pattern="gird")}, UnknownName, "did you mean 'grid'"),
+        (COLDER, BadInput, "one bed, two temperatures: etpu on tool 3 75 C, x60 on tool 4 60 C"),
+        ({3: ToolLoad(materials.load("air"))}, MissingValue, r"tool 3: air has no default .*add it under 'print'"),
+    ],
+)
+def test_impossible_loads_are_refused(loads, error, says):
+    with pytest.raises(error, match=says):
+        recipes(DIABASE, FINE, loads)
+
+
 @pytest.mark.parametrize(
     ("prints", "says"),
     [
@@ -50,28 +70,7 @@ def values(text: str) -> dict[str, str]:
 )
 def test_beyond_the_printer_is_refused(prints, says):
     with pytest.raises(OutOfRange, match=says):
-        prusa.profile(DIABASE, FINE, {3: ToolLoad(changed("etpu", **prints))})
-
-
-def test_missing_print_value_is_named_with_its_tool():
-    with pytest.raises(MissingValue, match=r"tool 3: air has no default .*add it under 'print'"):
-        recipes(DIABASE, FINE, {3: ToolLoad(materials.load("air"))})
-
-
-@pytest.mark.parametrize(
-    ("loads", "error", "says"),
-    [
-        ({}, BadInput, "no tool is loaded"),
-        ({6: ToolLoad(materials.load("etpu"))}, BadInput, r"no tool 6; its tools are \[1, 2, 3, 4, 5\]"),
-        ({3: ToolLoad(materials.load("etpu"), infill_percent=0)}, OutOfRange, r"infill \[%\] is 0; expected 1 to 100"),
-        ({3: ToolLoad(materials.load("etpu"), infill_pattern="gird")}, UnknownName, "did you mean 'grid'"),
-        ({3: ToolLoad(materials.load("etpu")), 4: ToolLoad(changed("x60", bed_temperature_c=60.0))},
-         BadInput, "one bed, two temperatures: etpu on tool 3 75 C, x60 on tool 4 60 C"),
-    ],
-)  # fmt: skip
-def test_impossible_loads_are_refused(loads, error, says):
-    with pytest.raises(error, match=says):
-        cura.profiles(DIABASE, FINE, loads)
+        recipes(DIABASE, FINE, {3: ToolLoad(changed("etpu", **prints))})
 
 
 def test_layers_thinner_than_the_printer_are_refused():
@@ -100,26 +99,23 @@ def test_prusa_lists_have_one_entry_per_tool(printer, quality):
     assert {float(v) for k, v in found.items() if k.endswith("extrusion_width")} == {printer.line_mm()}
 
 
-def test_prusa_unused_tools_are_named_so_and_stay_cold():
-    found = ini(prusa.profile(DIABASE, FINE, usual(DIABASE)))
-    assert found["filament_settings_id"] == '"unused";"unused";"etpu";"x60";"unused"'
-    assert found["temperature"] == "0,0,210,230,0"
-    assert found["first_layer_bed_temperature"] == "0,0,75,75,0"
+UNCHANGED = ("thick_bridges", "elefant_foot_compensation", "xy_size_compensation", "raft_layers", "support_material")
 
 
 @pytest.mark.parametrize(
-    ("name", "shape"), [("diabase-h5", "-195x-85,195x-85,195x85,-195x85"), ("prusa-xl5", "0x0,360x0,360x360,0x360")]
-)
-def test_prusa_bed_lies_where_the_printer_has_its_origin(name, shape):
-    printer = load_printer(name)
-    assert ini(prusa.profile(printer, FINE, usual(printer)))["bed_shape"] == shape
-
-
-def test_prusa_nothing_changes_the_drawing():
-    found = ini(prusa.profile(DIABASE, FINE, usual(DIABASE)))
-    kept = ("thick_bridges", "elefant_foot_compensation", "xy_size_compensation", "raft_layers", "support_material")
-    assert {key: found[key] for key in kept} == dict.fromkeys(kept, "0")
-    assert found["perimeter_generator"] == "arachne"
+    ("printer", "values"),
+    [
+        ("diabase-h5", {"filament_settings_id": '"unused";"unused";"etpu";"x60";"unused"',
+                        "temperature": "0,0,210,230,0", "first_layer_bed_temperature": "0,0,75,75,0"}),
+        ("diabase-h5", {"bed_shape": "-195x-85,195x-85,195x85,-195x85"}),
+        ("prusa-xl5", {"bed_shape": "0x0,360x0,360x360,0x360"}),
+        ("diabase-h5", dict.fromkeys(UNCHANGED, "0") | {"perimeter_generator": "arachne"}),
+    ],
+    ids=["unused tools stay cold", "origin in the middle", "origin in a corner", "the drawing stays"],
+)  # fmt: skip
+def test_prusa_settings(printer, values):
+    loaded = load_printer(printer)
+    assert values.items() <= ini(prusa.profile(loaded, FINE, usual(loaded))).items()
 
 
 def test_prusa_takes_what_is_safe_for_all_and_bodies_carry_their_own():
