@@ -111,28 +111,20 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
 
 def _step(cell: "_Cell", layers: LayerCell, factors: Sequence[float], order: int) -> fem.FieldStep:
     """One mesh, with lines at some distances from outlines, in electrode gaps."""
-    meshes = _meshes(cell, layers, [factor * cell.gap_mm for factor in (*(_AROUND if cell.air_mm else ()), *factors)])
-    most, outer = _OPEN_MB if cell.air_mm else _MOST_MB, meshes.potential
+    beside_mm = [factor * cell.gap_mm for factor in (*(_AROUND if cell.air_mm else ()), *factors)]
+    most, (inner, outer) = _OPEN_MB if cell.air_mm else _MOST_MB, _meshes(cell, layers, beside_mm)
     if outer.memory_mb(order) > most:
         raise fem.Unsolved(f"{outer.memory_mb(order):.0f} MB; meshes of up to {most:g} MB are solved")
-    energies = solved(meshes.flux, outer, order, cell.shares(outer), enclosed=meshes.enclosed)
+    energies = solved(inner, outer, order, cell.shares(outer))
     interval = fem.whole(energies, np.outer(cell.x.shares, cell.y.shares).ravel().tolist())
     return fem.FieldStep(order, int(outer.free.sum()), energies.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
 
 
-@dataclass(frozen=True)
-class _Meshes:
-    """Meshes of a cell for the flux and for the potential, and whether their outlines enclose the cell's."""
+def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> tuple[PrismMesh, PrismMesh]:
+    """Meshes for the flux and for the potential, with the outlines of a cell, or with such that enclose them.
 
-    flux: PrismMesh
-    potential: PrismMesh
-    enclosed: bool
-
-
-def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> _Meshes:
-    """Meshes with the outlines of a cell, or where these nearly coincide, with outlines that enclose them.
-
-    With air around it, the flux stays in that air, and the potential is constant beyond: a conductor that floats.
+    The latter where outlines nearly coincide. With air around it, the flux stays in that air, and the potential is
+    constant beyond: a conductor that floats.
     """
     if not cell.outer:  # with it, no layer has outlines of its own
         with suppress(fem.Unsolved):  # the grid is too fine, as coarser ones may not be
@@ -141,17 +133,16 @@ def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> _Me
                     if exact := _exact(cell, layers, [times * far for far in beside_mm]):
                         return exact
     flux = _enclosing(cell, layers, beside_mm, outwards=False)
-    return _Meshes(flux, _enclosing(cell, layers, beside_mm, outwards=True), enclosed=True)
+    return flux, _enclosing(cell, layers, beside_mm, outwards=True)
 
 
-def _exact(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> _Meshes | None:
+def _exact(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> tuple[PrismMesh, PrismMesh] | None:
     """Meshes with the outlines of a cell; None where their triangles are too slender or cannot be made."""
     far_mm = cell.far_mm()
     with suppress(fem.Unsolved):
         exact = PrismMesh.of(layers, beside_mm, _GRID_MM, far_mm)
         if exact.plan.slenderness_mm() > _SLENDER_MM:
-            other = PrismMesh.of(cell.inside_shell(layers), beside_mm, _GRID_MM, far_mm) if cell.air_mm else exact
-            return _Meshes(exact, other, enclosed=False)
+            return exact, PrismMesh.of(cell.inside_shell(layers), beside_mm, _GRID_MM, far_mm) if cell.air_mm else exact
     return None
 
 

@@ -60,7 +60,7 @@ def enclosing(cell: LayerCell, grid_mm: float, far_mm: float, loose_mm: float, *
         one = [_moved(region, cell, by, loose) for region in group]
         moved += [one] * (more - k)
         k = more
-    return replace(cell, regions=[_regions(cell, levels, order) for levels in moved])
+    return replace(cell, regions=[_regions(cell, levels, order) for levels in moved], encloses=True)
 
 
 def _levels(cell: LayerCell, own: dict[int, Any], order: Any) -> Levels:

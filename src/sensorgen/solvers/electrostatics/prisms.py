@@ -53,6 +53,9 @@ class LayerCell:
         Where else along x and y outlines are cut, as by the end of a sensor [mm].
     in_shell : bool
         Whether the last conductor is a shell around the others, far from them.
+    encloses : bool
+        Whether its outlines enclose those of another cell, as of :mod:`sensorgen.solvers.electrostatics.enclosed`, or
+        are enclosed by them; else rounding may have moved them.
     """
 
     size_mm: tuple[float, float]
@@ -63,6 +66,7 @@ class LayerCell:
     periodic: tuple[bool, bool] = (False, False)
     cuts_mm: tuple[Sequence[float], Sequence[float]] = ((), ())
     in_shell: bool = False
+    encloses: bool = False
 
 
 @dataclass(frozen=True)
@@ -406,7 +410,7 @@ def _distinct(faces: Whole) -> Whole:
     return faces[np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]]
 
 
-def solved(inner: PrismMesh, outer: PrismMesh, order: int, weight: Real, *, enclosed: bool = False) -> Energies:
+def solved(inner: PrismMesh, outer: PrismMesh, order: int, weight: Real) -> Energies:
     """Both bounds over eps0 [mm], of a potential of an order and of a flux of one less.
 
     Parameters
@@ -417,9 +421,6 @@ def solved(inner: PrismMesh, outer: PrismMesh, order: int, weight: Real, *, encl
         Of the potential's polynomials.
     weight : (t,) array
         Of each triangle of the outer one in ``Energies.part``.
-    enclosed : bool
-        Whether both are of outlines that enclose the true ones, as of
-        :mod:`sensorgen.solvers.electrostatics.enclosed`; else the grid may have moved those.
 
     Raises
     ------
@@ -428,7 +429,7 @@ def solved(inner: PrismMesh, outer: PrismMesh, order: int, weight: Real, *, encl
     """
     upper, part, moved = _upper(outer, order, weight)
     lower, unknowns = _lower(inner, order)
-    return Energies(lower, upper, part, unknowns, 0.0 if enclosed else moved / upper, outer is not inner)
+    return Energies(lower, upper, part, unknowns, 0.0 if outer.cell.encloses else moved / upper, outer is not inner)
 
 
 def _upper(mesh: PrismMesh, order: int, weight: Real) -> tuple[float, float, float]:

@@ -13,6 +13,7 @@ import shapely
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Whole
+from sensorgen.scene.connections import groups
 from sensorgen.scene.repetition import Band, SectionCell, Slice, cell
 from sensorgen.scene.sections import ROUNDING_MM, Section, distinct
 
@@ -95,16 +96,14 @@ def _terminals(filled: "_Filled", owners: Mapping[Edge, Sequence[int]], inside: 
 
 def _between_electrodes(filled: "_Filled", owners: Mapping[Edge, Sequence[int]]) -> set[int]:
     """Dielectric triangles whose field runs from one electrode to the other."""
-    beside: dict[int, list[int]] = defaultdict(list)
-    for pair in (sides for sides in owners.values() if len(sides) == 2):
-        beside[pair[0]].append(pair[1])
-        beside[pair[1]].append(pair[0])
-    left = {n for n, (_, (what, _)) in enumerate(filled) if what and not what.startswith("@")}
-    inside: set[int] = set()
-    while left:
-        piece, ends = _piece(filled, beside, left)
-        left -= piece
-        inside |= piece if len(ends) == 2 else set()
+    what = np.array([name for _, (name, _) in filled])
+    metal = {end: what == end for end in ("@bottom", "@top")}
+    free = (what != "") & ~np.logical_or(*metal.values())
+    pairs = np.array([sides for sides in owners.values() if len(sides) == 2], int).reshape(-1, 2)
+    piece = groups(len(what), *pairs[free[pairs].all(axis=1)].T)
+    beside = [pairs[(end[pairs] & free[pairs[:, ::-1]]).any(axis=1)] for end in metal.values()]
+    both = np.intersect1d(*(piece[sides[free[sides]]] for sides in beside))
+    inside = set(np.flatnonzero(free & np.isin(piece, both)).tolist())
     if not inside:
         raise ValueError("no dielectric lies between a top and a bottom electrode")
     return inside
@@ -179,20 +178,6 @@ def filled(polygon: Sequence[int], places: Sequence[Sequence[float]]) -> list[Tr
 
 
 _CONTACT_MM = 1e-7  # a gap below a tenth of a nanometre is contact
-
-
-def _piece(filled: _Filled, beside: dict[int, list[int]], left: set[int]) -> tuple[set[int], set[str]]:
-    """A connected piece of dielectric, and the electrodes that it touches."""
-    todo = [next(iter(left))]
-    piece, ends = set(todo), set()
-    while todo:
-        for n in beside[todo.pop()]:
-            if filled[n][1][0].startswith("@"):
-                ends.add(filled[n][1][0])
-            elif n in left and n not in piece:
-                piece.add(n)
-                todo.append(n)
-    return piece, ends
 
 
 def _refuse_contact(points: NDArray[np.float64], filled: _Filled) -> None:
