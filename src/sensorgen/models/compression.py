@@ -331,7 +331,7 @@ def extended(law: CapacitanceCurve, most_pa: float, slope_per_pa: float) -> Capa
     )  # fmt: skip
 
 
-def curve_of(pressed: "Pressed", name: str = "solved") -> CapacitanceCurve:
+def curve_of(pressed: "Pressed") -> CapacitanceCurve:
     """The pressure law of a solved cell.
 
     Raises
@@ -343,7 +343,7 @@ def curve_of(pressed: "Pressed", name: str = "solved") -> CapacitanceCurve:
         raise OutOfRange(f"the solved cell is not to be trusted: {'; '.join(pressed.faults)}")
     known = [(p, c.middle()) for p, c in zip(pressed.stress_pa, pressed.capacitance_f_per_m2, strict=True) if c]
     ratio = [c / known[0][1] for _, c in known] if known else []
-    return curve(name, pressed.source, [float(p) for p, _ in known], ratio)
+    return curve("solved", pressed.source, [float(p) for p, _ in known], ratio)
 
 
 def _slopes(p: Real, g: Real) -> Real:

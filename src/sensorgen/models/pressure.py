@@ -26,15 +26,12 @@ class PressureProfile:
 
     Attributes
     ----------
-    source : str
-        Tip that it describes.
     share : function
         Share of the force up to a place, from 0 at one end of the tip to 1 at the other [-].
     density : function
         Its derivative: pressure over its mean [-].
     """
 
-    source: str
     share: Callable[[Real], Real]
     density: Callable[[Real], Real]
 
@@ -45,12 +42,13 @@ def _hertz_share(place: Real) -> Real:
 
 
 _KNOWN = {
-    "uniform": PressureProfile("flat tip, soft, or hard on a film much thinner than itself", lambda u: u, np.ones_like),
-    "hertz": PressureProfile("round tip on a body much thicker than the contact is long: an ellipse", _hertz_share,
-                             lambda u: 8 / np.pi * np.sqrt(u * (1 - u))),
-    "parabola": PressureProfile("hard round tip on a thin layer, a bed of springs", lambda u: u * u * (3 - 2 * u),
-                                lambda u: 6 * u * (1 - u)),
-}  # fmt: skip
+    # flat tip, soft, or hard on a film much thinner than itself
+    "uniform": PressureProfile(lambda u: u, np.ones_like),
+    # round tip on a body much thicker than the contact is long: an ellipse
+    "hertz": PressureProfile(_hertz_share, lambda u: 8 / np.pi * np.sqrt(u * (1 - u))),
+    # hard round tip on a thin layer, a bed of springs
+    "parabola": PressureProfile(lambda u: u * u * (3 - 2 * u), lambda u: 6 * u * (1 - u)),
+}
 PROFILES = tuple(_KNOWN)
 
 

@@ -9,7 +9,7 @@ towards edges and tips of conductors, where the field is infinite (hp-refinement
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import combinations
 from math import atan2, inf, pi
 from typing import Any, NamedTuple
@@ -93,12 +93,12 @@ def mesh_of(cell: RoundCell, order: int, layers: int, closed: float) -> RoundMes
         raise NotInstalled("curved bodies need NGSolve: pip install 'sensorgen[fem]'") from None
     cusps = [(touch, closed * touch.apart_mm) for touch in touches(cell)]
     try:
-        shape, grading = _shape(cell, cusps)
+        shape, is_graded, along = _shape(cell, cusps)
         geometry = occ.OCCGeometry(shape)
     except occ.OCCException as error:
         raise Unsolved(f"the CAD kernel does not cut this cell: {error}") from None
     longest = _COARSE * min(np.subtract(cell.high_mm, cell.low_mm)[:2])
-    sizes = cell.sizes(np.array(grading.along).reshape(-1, 3), _NEAR, longest)
+    sizes = cell.sizes(np.array(along).reshape(-1, 3), _NEAR, longest)
     sizes += [size for touch, gap in cusps for size in touch.sizes(cell, gap, _CUSP)]
     growth = 0.5
     for _ in range(_TRIES):
@@ -116,7 +116,7 @@ def mesh_of(cell: RoundCell, order: int, layers: int, closed: float) -> RoundMes
             raise Unsolved(f"{unknowns} unknowns; meshes of up to {_MOST} are solved")
         rounds, (middles, spans) = _named(coarse), _elements(coarse)
         mesh = ng.Mesh(coarse)
-        if grading.any:
+        if is_graded:
             mesh.RefineHP(layers, _SHRINK)
         mesh.Curve(order + 1)
         bad = unsound(mesh, order)
@@ -163,8 +163,13 @@ def _middles(mesh: Any) -> Real:
     return np.array([points[[v.nr for v in element.vertices]].mean(0) for element in mesh.Elements()])
 
 
-def _shape(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> tuple[Any, "_Grading"]:
-    """All dielectrics with their common faces, named by conductor; edges and tips to be graded are marked."""
+def _shape(
+    cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]
+) -> tuple[Any, bool, list[tuple[float, float, float]]]:
+    """All dielectrics with their common faces, named by conductor; edges and tips to be graded are marked.
+
+    Also whether there are some, and places on the edges [mm].
+    """
     import netgen.occ as occ
 
     whole = _glued(_solids(cell, cusps))
@@ -172,9 +177,7 @@ def _shape(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> tuple[A
     faces = _named_faces([one for one in dielectrics if one.name[0] == "t"] + metal)
     _refuse_contact(cell, faces, dielectrics)
     _refuse_open(cell, dielectrics)
-    grading = _Grading(cell)
-    grading.mark([face for name, own in faces.items() if name[0] == "c" for face in own])
-    return occ.Compound(dielectrics), grading
+    return occ.Compound(dielectrics), *_graded(cell, [f for name, own in faces.items() if name[0] == "c" for f in own])
 
 
 def _named_faces(solids: Sequence[Any]) -> dict[str, list[Any]]:
@@ -297,70 +300,61 @@ def _key(place: Any) -> tuple[float, ...]:
     return tuple((np.array(tuple(place)).round(6) + 0.0).tolist())
 
 
-@dataclass
-class _Grading:
-    """Edges and corners of conductors around which dielectrics fill more than half of a small sphere.
+def _graded(cell: RoundCell, faces: Sequence[Any]) -> tuple[bool, list[tuple[float, float, float]]]:
+    """Mark edges and corners of conductors around which dielectrics fill more than half of a small sphere.
 
-    Attributes
-    ----------
-    cell : RoundCell
-        What is meshed.
-    any : bool
-        Whether some were marked.
-    along : list of (float, float, float)
-        Places on marked edges [mm].
+    Whether there are some, and places on marked edges [mm].
     """
+    edges = [edge for face in faces for edge in face.edges if edge.mass > SAME_MM]  # poles have edges of no length
+    along, ways = _graded_edges(cell, edges)
+    corners = {_key(vertex.p): vertex for edge in edges for vertex in edge.vertices}
+    marked = [
+        vertex
+        for place, vertex in corners.items()
+        if _is_corner(cell, place, ways.get(place, [])) and _is_open(cell, np.array(place))
+    ]
+    for vertex in marked:
+        vertex.hpref = 1
+    return bool(along or marked), along
 
-    cell: RoundCell
-    any: bool = False
-    along: list[tuple[float, float, float]] = field(default_factory=list)
 
-    def mark(self, faces: Sequence[Any]) -> None:
-        """Mark those of some faces."""
-        edges = [edge for face in faces for edge in face.edges if edge.mass > SAME_MM]  # poles have edges of no length
-        ways = self._mark_edges(edges)
-        corners = {_key(vertex.p): vertex for edge in edges for vertex in edge.vertices}
-        for place, vertex in corners.items():
-            if self._is_corner(place, ways.get(place, [])) and self._is_open(np.array(place)):
-                vertex.hpref = 1
-                self.any = True
+def _graded_edges(
+    cell: RoundCell, edges: Sequence[Any]
+) -> tuple[list[tuple[float, float, float]], dict[tuple[float, ...], list[Real]]]:
+    """Mark those of some edges that are open: places on them, and unit vectors along them from each of their ends."""
+    along, ways = list[tuple[float, float, float]](), dict[tuple[float, ...], list[Real]]()
+    seen = set()
+    for edge in edges:
+        low, high = edge.parameter_interval
+        middle = np.array(tuple(edge.Value((low + high) / 2)))
+        if _key(middle) in seen:
+            continue
+        seen.add(_key(middle))
+        if _is_open(cell, middle):
+            edge.hpref = 1
+            along += [tuple(edge.Value(t)) for t in np.linspace(low, high, 17)]
+            for end in dict.fromkeys(_key(vertex.p) for vertex in edge.vertices):
+                ways.setdefault(end, []).append((middle - end) / np.linalg.norm(middle - end))
+    return along, ways
 
-    def _mark_edges(self, edges: Sequence[Any]) -> dict[tuple[float, ...], list[Real]]:
-        """Mark those of some edges that are open; unit vectors along them from each of their ends."""
-        ways: dict[tuple[float, ...], list[Real]] = {}
-        seen = set()
-        for edge in edges:
-            low, high = edge.parameter_interval
-            middle = np.array(tuple(edge.Value((low + high) / 2)))
-            if _key(middle) in seen:
-                continue
-            seen.add(_key(middle))
-            if self._is_open(middle):
-                edge.hpref = 1
-                self.any = True
-                self.along += [tuple(edge.Value(t)) for t in np.linspace(low, high, 17)]
-                for end in dict.fromkeys(_key(vertex.p) for vertex in edge.vertices):
-                    ways.setdefault(end, []).append((middle - end) / np.linalg.norm(middle - end))
-        return ways
 
-    def _is_open(self, place: Real) -> bool:
-        height = 1 - (2 * np.arange(_SPHERE) + 1) / _SPHERE
-        turn, across = np.arange(_SPHERE) * pi * (1 + 5**0.5), np.sqrt(1 - height**2)
-        ball = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
-        radius = _RADIUS * min(np.subtract(self.cell.high_mm, self.cell.low_mm))
-        return bool(1 - self.cell.conducts(place + radius * ball).mean() > _REENTRANT)
+def _is_open(cell: RoundCell, place: Real) -> bool:
+    """Test whether dielectrics fill more than half of a small sphere around a place, by places on it."""
+    height = 1 - (2 * np.arange(_SPHERE) + 1) / _SPHERE
+    turn, across = np.arange(_SPHERE) * pi * (1 + 5**0.5), np.sqrt(1 - height**2)
+    ball = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
+    radius = _RADIUS * min(np.subtract(cell.high_mm, cell.low_mm))
+    return bool(1 - cell.conducts(place + radius * ball).mean() > _REENTRANT)
 
-    def _is_corner(self, place: tuple[float, ...], ways: Sequence[Real]) -> bool:
-        """Test whether marked edges, mirrored at the sides of the cell, end or turn at a place."""
-        every = list(ways)
-        for axis in (0, 1):
-            if (
-                min(abs(place[axis] - self.cell.low_mm[axis]), abs(place[axis] - self.cell.high_mm[axis]))
-                < SAME_MM * 10
-            ):
-                every += [way * np.where(np.arange(3) == axis, -1, 1) for way in every]
-        distinct = np.array(list({tuple((way + 0.0).round(2).tolist()) for way in every})).reshape(-1, 3)
-        return len(distinct) != 2 or bool((distinct.sum(0) ** 2).sum() > 0.5)
+
+def _is_corner(cell: RoundCell, place: tuple[float, ...], ways: Sequence[Real]) -> bool:
+    """Test whether marked edges, mirrored at the sides of the cell, end or turn at a place."""
+    every = list(ways)
+    for axis in (0, 1):
+        if min(abs(place[axis] - cell.low_mm[axis]), abs(place[axis] - cell.high_mm[axis])) < SAME_MM * 10:
+            every += [way * np.where(np.arange(3) == axis, -1, 1) for way in every]
+    distinct = np.array(list({tuple((way + 0.0).round(2).tolist()) for way in every})).reshape(-1, 3)
+    return len(distinct) != 2 or bool((distinct.sum(0) ** 2).sum() > 0.5)
 
 
 __all__ = ["LEVELS", "RoundCell", "RoundLevel", "bounds", "solved"]
