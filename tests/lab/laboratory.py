@@ -22,6 +22,7 @@ from sensorgen.measure.virtual.specimen import PressedSpecimen, drawn
 
 LIMIT_N = 7.0
 CLEARANCE_MM, STROKE_MM = 10.0, 15.0  # a third of the usual ways: a raised stage is out of the piston's reach
+QUICK = {"speed_mm_s": 100.0, "landing_mm_s": 20.0, "travel_mm_s": 100.0}
 PLAN = [
     {"hold": {"position_mm": 30, "force_n": 4.0, "hold_s": 1.0, "rest_s": 2.0}},
     {"hold": {"position_mm": 70, "force_n": 2.0, "hold_s": 1.0, "rest_s": 2.0}},
@@ -37,8 +38,7 @@ def specimen() -> PressedSpecimen:
 
 def asked(**changes: Any) -> experiment.Experiment:
     """A short experiment."""
-    quick = {"speed_mm_s": 100.0, "landing_mm_s": 20.0, "travel_mm_s": 100.0}
-    return checked(experiment.Experiment, {"specimen": "24 SX60", "plan": PLAN, "approach": quick} | changes)
+    return checked(experiment.Experiment, {"specimen": "24 SX60", "plan": PLAN, "approach": QUICK} | changes)
 
 
 class Watched(FaultSchedule):

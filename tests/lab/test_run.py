@@ -10,7 +10,7 @@ import pytest
 import yaml
 from click.testing import CliRunner
 from fakes import fake_lab
-from laboratory import PLAN, done, laboratory, left_alone, outcome, pairs
+from laboratory import PLAN, QUICK, done, laboratory, left_alone, outcome, pairs
 
 from sensorgen.cli import cli
 from sensorgen.core import document
@@ -260,7 +260,7 @@ def _cli(*words):
 
 def _file(tmp_path, **changes):
     file = tmp_path / "e.yaml"
-    data = {"specimen": "24 SX60", "plan": PLAN, "virtual": {"design": "reference"}} | changes
+    data = {"specimen": "24 SX60", "plan": PLAN, "approach": QUICK, "virtual": {"design": "reference"}} | changes
     file.write_text(yaml.safe_dump(data))
     return file
 

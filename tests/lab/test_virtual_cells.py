@@ -9,6 +9,7 @@ import pytest
 import yaml
 from cell_scenes import rect_cell
 from click.testing import CliRunner
+from laboratory import QUICK
 
 from sensorgen.asprinted import printed
 from sensorgen.cli import cli
@@ -268,7 +269,7 @@ def test_a_bench_presses_crossed_strips(tmp_path, monkeypatch, coarse):
     monkeypatch.chdir(tmp_path)
     Path("mine.yaml").write_text(yaml.safe_dump(RECT), "utf-8")
     plan = [{"hold": {"position_mm": 40, "force_n": 4.0, "hold_s": 1.0, "rest_s": 2.0}}]
-    asked = {"specimen": "S1", "virtual": {"seed": 3}, "plan": plan}
+    asked = {"specimen": "S1", "virtual": {"seed": 3}, "plan": plan, "approach": QUICK}
     Path("first.yaml").write_text(yaml.safe_dump(asked), "utf-8")
     for words in (["log", "specimen", "S1", "--design", "mine.yaml"], ["bench", "run", "first.yaml", "--simulate"]):
         done = CliRunner().invoke(cli, words)
