@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from line_cases import PLATE as LINE_PLATE
+from line_cases import exact
 from pydantic import TypeAdapter
 from scipy.optimize import least_squares
 
@@ -88,18 +90,11 @@ def test_bounds_along_the_sensors_of_tables_3_1_and_c1(sensor, along, force_n, p
 # ---- the bound against independent computations ----
 
 
-def by_matrices(sensor: Sensor, frequency_hz: float, force_n: float, position_m: float) -> complex:
-    """Z of the pressed plate by chain matrices of its three sections, written down anew."""
-    r = sum(sensor.resistivity_ohm_m) / 3e-4 / sensor.width_m
-    y = 2j * math.pi * frequency_hz * sensor.capacitance_f_per_m
-    strain = force_n / (sensor.width_m * sensor.tip_m * sensor.compression.modulus_pa)
-    left = position_m - sensor.tip_m / 2
-    chain = np.eye(2, dtype=complex)
-    for shunt, length in ((y, left), (y / (1 - strain), sensor.tip_m), (y, sensor.length_m - left - sensor.tip_m)):
-        gamma, zc = np.sqrt(r * shunt), np.sqrt(r / shunt)
-        c, s = np.cosh(gamma * length), np.sinh(gamma * length)
-        chain = chain @ np.array([[c, zc * s], [s / zc, c]])
-    return chain[0, 0] / chain[1, 0]
+def exactly(force_n: float, position_m: float) -> np.ndarray:
+    """Z at each tone of the pressed plate, both electrodes of 0.83 ohm m, by transfer matrices in mpmath."""
+    given = LINE_PLATE | dict.fromkeys(("top_resistivity_ohm_m", "bottom_resistivity_ohm_m"), 0.83)
+    given |= {"force_n": force_n, "left_m": position_m - 5e-3}
+    return np.array([complex(exact(30, **given | {"frequency_hz": tone})) for tone in TONES_HZ])
 
 
 @pytest.mark.parametrize(("force", "place"), [(6.0, 0.05), (1.0, 0.02)])
@@ -107,10 +102,10 @@ def test_bounds_are_the_inverted_fisher_matrix_by_differences(force, place):
     sensor, noise = of_resistivity(PLATE, 0.83), 2e-3
 
     def parts(f, x):
-        z = np.array([by_matrices(sensor, tone, f, x) for tone in TONES_HZ])
+        z = exactly(f, x)
         return np.concatenate([z.real, z.imag])
 
-    size = np.abs([by_matrices(sensor, tone, force, place) for tone in TONES_HZ])
+    size = np.abs(exactly(force, place))
     weight = 1 / (noise * np.concatenate([size, size]))
     by_force = (parts(force + 0.05, place) - parts(force - 0.05, place)) / 0.1 * weight
     by_place = (parts(force, place + 1e-4) - parts(force, place - 1e-4)) / 2e-4 * weight

@@ -8,7 +8,6 @@ import math
 import tracemalloc
 from dataclasses import replace
 
-import mpmath
 import numpy as np
 import pytest
 from drawn_sensor import sensor_of
@@ -201,20 +200,8 @@ def plate():
 
 
 def exact(f, force, x_mm):
-    """B.53 and B.49 with 40 digits: three sections by their transfer, the tip of 10 mm wholly on the sensor."""
-    with mpmath.workdps(40):
-        r = mpmath.mpf("0.07") / (mpmath.mpf("3e-4") * mpmath.mpf("0.01")) * (1 + mpmath.mpf(20) / 7)
-        loose = 2j * mpmath.pi * mpmath.mpf(f) * mpmath.mpf("8.8541878128e-12") * mpmath.mpf("4.68")
-        loose *= mpmath.mpf("0.01") / mpmath.mpf("6e-4")
-        pressed = loose / (1 - mpmath.mpf(force) / (mpmath.mpf("0.01") ** 2 * 6000000))
-        left = mpmath.mpf(x_mm) / 1000 - mpmath.mpf("0.005")
-        z = mpmath.inf
-        for y, length in ((loose, mpmath.mpf("0.09") - left), (pressed, mpmath.mpf("0.01")), (loose, left)):
-            if length < 1e-30:
-                continue
-            zc, t = mpmath.sqrt(r / y), mpmath.tanh(mpmath.sqrt(r * y) * length)
-            z = zc / t if z == mpmath.inf else zc * (z + zc * t) / (zc + z * t)
-        return complex(z)
+    """B.53 and B.49 with 40 digits, the tip of 10 mm wholly on the sensor."""
+    return complex(exact_line(40, **LINE_PLATE | {"force_n": force, "left_m": x_mm / 1e3 - 5e-3, "frequency_hz": f}))
 
 
 def test_the_grid_is_the_line_with_forty_digits(plate):
