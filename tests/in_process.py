@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import json
 import sys
 from dataclasses import dataclass
 
@@ -22,6 +23,29 @@ class Said:
     def words(self):
         """The output without its line breaks and columns."""
         return " ".join(self.out.split())
+
+    @property
+    def json(self):
+        """The output as data."""
+        return json.loads(self.out)
+
+    @property
+    def ok(self):
+        """The command has ended well."""
+        assert self.code == 0, self.err
+        return self
+
+    @property
+    def clean(self):
+        """It has ended well, and told nothing on stderr."""
+        assert (self.code, self.err) == (0, "")
+        return self
+
+    @property
+    def refusal(self) -> str:
+        """The line of wrong input."""
+        assert self.code == 2, self.out
+        return self.line
 
     @property
     def line(self) -> str:

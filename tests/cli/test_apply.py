@@ -18,8 +18,7 @@ quality: fine
 def test_apply_writes_into_the_file(run, tmp_path, shared_cache):
     path = tmp_path / "plate.yaml"
     path.write_text(OFF_GRID, "utf-8")
-    said = run("check", str(path), "--budget", "600", "--apply")
-    assert said.code == 0
+    said = run("check", str(path), "--budget", "600", "--apply").ok
     assert said.out.splitlines()[0].startswith("PRINT WITH WARNINGS  plate: 5 warnings")
     assert "1.  dielectric_mm 0.57 -> 0.6: 0 errors, 0 warnings; C " in said.out
     assert path.read_text("utf-8") == OFF_GRID.replace("0.57", "0.6")

@@ -74,9 +74,7 @@ def test_findings_of_severity_error_stop_it(run, plan):
 
 def test_a_full_disk_leaves_nothing_half_there(run, plan, disk):
     small = disk(60_000)
-    said = run("batch", str(plan), "--no-gcode", "--out", small)
-    assert said.code == 2
-    assert "No space left" in said.line
+    assert "No space left" in run("batch", str(plan), "--no-gcode", "--out", small).refusal
     assert list(small.rglob("*")) == []
 
 

@@ -112,8 +112,7 @@ def test_from_files_of_the_bench_to_force_and_place(after, tmp_path):
     for words in ("Calibration of S1", "each press found again from the others", "what was learnt"):
         assert words in page
     unseen(tmp_path / "m.csv")
-    said = after("invert", "S1", "m.csv", "-o", "o.csv")
-    assert (said.code, said.err) == (0, "")
+    said = after("invert", "S1", "m.csv", "-o", "o.csv").clean
     assert "S1: 100 readings under load (100 at rest)" in said.words
     found = rows(tmp_path / "o.csv")
     assert [row["status"] for row in found[::2]] == ["rest"] * 100
@@ -136,8 +135,7 @@ def test_the_record_of_the_log_says_it_all(bench, alone, made):
 
 @pytest.mark.usefixtures("roughly")
 def test_the_report_has_it(after):
-    said = after("report", "S1", "--format", "md", "-o", "-")
-    assert said.code == 0, said.err
+    said = after("report", "S1", "--format", "md", "-o", "-").ok
     assert "S1 is calibrated by 24 known presses; over the prediction: resistance" in said.words
     (told,) = re.findall(r"capacitance ([\d.]+) \(([\d.]+) to ([\d.]+)\)", said.words)
     value, low, high = map(float, told)
@@ -147,8 +145,7 @@ def test_the_report_has_it(after):
 
 def test_the_readings_of_another_specimen_are_called_so(after, tmp_path):
     unseen(tmp_path / "m.csv", 20, replace(TRUTH, capacitance=TRUTH.capacitance + 0.1))
-    said = after("invert", "S1", "m.csv", "-o", "o.csv")
-    assert said.code == 0, said.err
+    said = after("invert", "S1", "m.csv", "-o", "o.csv").ok
     assert "20 changed since calibration" in said.words
     assert "note: C +1" in said.words
     assert "at rest since the calibration: a load or moisture on it, or another specimen" in said.words
@@ -178,8 +175,7 @@ def test_a_recheck_with_another_tip_alarms_and_mends(after, tmp_path):
 def test_without_a_calibration_the_design_alone_says_so(run, tmp_path, monkeypatch):
     (tmp_path / "mine.yaml").write_text(DESIGN)
     unseen(tmp_path / "m.csv", 30)
-    said = run("invert", "mine.yaml", "m.csv", "--drawn", "--tip", "5mm", "-o", "o.csv")
-    assert said.code == 0, said.err
+    said = run("invert", "mine.yaml", "m.csv", "--drawn", "--tip", "5mm", "-o", "o.csv").ok
     assert " not calibrated" in said.words
     assert " ok" not in said.words
     assert "known presses make them several times narrower" in said.words
@@ -193,8 +189,7 @@ def test_readings_at_rest_may_stand_in_a_file_of_their_own(after, tmp_path):
         written(tmp_path / name, part, [n for n in table[0] if n not in ("rest", "time_s")])
     refused = after("invert", "S1", "pressed.csv").line
     assert ("a column 'rest'" in refused, "--perfect" in refused) == (True, False)  # that is of designs alone
-    said = after("invert", "S1", "pressed.csv", "--rest", "rest.csv", "-o", "o.csv")
-    assert said.code == 0, said.err
+    said = after("invert", "S1", "pressed.csv", "--rest", "rest.csv", "-o", "o.csv").ok
     assert "stale" not in said.words
     assert len(rows(tmp_path / "o.csv")) == 20
 
@@ -221,9 +216,7 @@ MISSING = {
 def test_what_is_missing_is_one_line(bench):
     assert bench("log", "specimen", "S2", "--design", "mine.yaml").code == 0
     for words, said in MISSING.items():
-        found = bench("calibrate", *words.split())
-        assert found.code == 2
-        assert said in found.line
+        assert said in bench("calibrate", *words.split()).refusal
 
 
 def meter(truth, frequency_hz):
@@ -295,13 +288,10 @@ def test_readings_that_no_specimen_has_are_named(bench):
     """A phase of the wrong sign, a capacitance in F for pF; a remark that is no reading changes nothing."""
     assert bench("log", "specimen", "S2", "--design", "mine.yaml").code == 0
     assert bench("log", "add", "S2", "--Z", "2.6Mohm@1kHz", "--phase", "88deg@1kHz", "--baked").code == 0
-    said = bench("calibrate", "S2", "--drawn")
-    assert said.code == 2
-    assert "left out: no capacitor" in said.line
+    assert "left out: no capacitor" in bench("calibrate", "S2", "--drawn").refusal
     assert bench("log", "add", "S2", "--C", "60F@1kHz", "--baked").code == 0
     assert bench("log", "add", "S2", "--remark", "moved to another box").code == 0
-    found = bench("calibrate", "S2", "--drawn", "--dry-run")
-    assert found.code == 0, found.err
+    found = bench("calibrate", "S2", "--drawn", "--dry-run").ok
     assert "2 readings of meters count, baked" in found.words
     assert "fit no specimen of this design" in found.words
 

@@ -45,7 +45,5 @@ def test_one_form_at_a_time(run):
     "words", ["build tri", "slice tri", "batch plan.yaml", "optimise tri", "import a.step", "demo lab"]
 )
 def test_o_of_a_command_that_writes_a_folder_is_that_folder(run, tmp_path, words):
-    said = run(*words.split(), "-o", "d.gcode")
-    assert said.code == 2
-    assert "--out: 'd.gcode' is the name of a file; expected a folder" in said.line
+    assert "--out: 'd.gcode' is the name of a file; expected a folder" in run(*words.split(), "-o", "d.gcode").refusal
     assert not (tmp_path / "d.gcode").exists()

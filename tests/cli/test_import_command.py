@@ -78,8 +78,7 @@ PLATES = ("--map", "film=x60@1", "--map", "*=etpu@2", "--map", "film=x60@1")
 @pytest.mark.parametrize("name", ROUND_TRIP)
 def test_our_own_step_is_the_design_again(run, models, name):
     """Same capacitance as the design that was exported, by models that know nothing of the import."""
-    said = run("import", models / f"{name}.step", *MAP)
-    assert (said.code, said.err) == (0, "")
+    assert run("import", models / f"{name}.step", *MAP).clean
     again, drawn = load(Path(f"{name}.yaml")), make({"shape": name, "parameters": ROUND_TRIP[name]})
     assert again.drawn.size_mm == pytest.approx(drawn.drawn.size_mm, abs=1e-12)
     assert [b.terminal for b in again.drawn.bodies] == [b.terminal for b in drawn.drawn.bodies]
@@ -107,8 +106,7 @@ def test_bodies_are_listed_with_a_map_to_start_from(run, models):
 
 @pytest.mark.usefixtures("shared_kernel")
 def test_a_round_bump_is_a_body_of_revolution_exactly(run, models):
-    said = run("import", models / "dome.step", *MAP)
-    assert (said.code, said.err) == (0, "")
+    assert run("import", models / "dome.step", *MAP).clean
     (bump,) = load(Path("dome.yaml")).drawn.body("bump").pieces
     cap = np.pi * cad_models.RISE_MM**2 * (cad_models.BALL_MM - cad_models.RISE_MM / 3)
     assert bump.volume_mm3() == pytest.approx(cap, rel=1e-6)
@@ -133,8 +131,7 @@ def test_triangles_lie_as_near_as_stated(kernel, models):
 @pytest.mark.usefixtures("shared_kernel")
 def test_electrodes_get_their_ends_by_height_unless_told(run, models):
     words = ("--map", "*er=etpu@2", "--map", "film=x60@1", "--map", "carrier=x60@1")
-    said = run("import", models / "crossed.step", *words)
-    assert said.code == 0
+    assert run("import", models / "crossed.step", *words).ok
     assert {b.name: b.terminal for b in load(Path("crossed.yaml")).drawn.bodies} == {
         "carrier": "", "lower": "bottom", "film": "", "upper": "top"
     }  # fmt: skip
@@ -166,8 +163,7 @@ def faulty_open(made):
 
 def test_stl_files_are_repaired_and_walk_on(run, plates):
     files = plates(faulty_open)
-    said = run("import", *files, "--unit", "mm", "--name", "three", *PLATES)
-    assert said.code == 0
+    said = run("import", *files, "--unit", "mm", "--name", "three", *PLATES).ok
     assert "a flat opening" in said.words
     design = load(Path("three.yaml"))
     exact_first = ["--map", "film=x60@1", "--map", "*w=etpu@2", "--map", "up=etpu@2", "--map", "*=x60@1"]
@@ -202,9 +198,7 @@ def test_wrong_words_are_one_line_and_nothing_is_written(run, plates):
     files = plates()
     before = sorted(path.name for path in Path().iterdir())
     for words, line in WRONG:
-        said = run("import", *files, *words)
-        assert said.code == WRONG_INPUT
-        assert line in said.line
+        assert line in run("import", *files, *words).refusal
     assert sorted(p.name for p in Path().iterdir() if not p.name.endswith("-faults.svg")) == before
 
 
@@ -221,9 +215,7 @@ def test_wrong_words_are_one_line_and_nothing_is_written(run, plates):
 @pytest.mark.usefixtures("shared_kernel")
 def test_files_that_are_none_are_one_line(run, tmp_path, name, content, line):
     (tmp_path / name).write_bytes(content)
-    said = run("import", name)
-    assert said.code == WRONG_INPUT
-    assert line in said.line
+    assert line in run("import", name).refusal
 
 
 def test_a_step_of_500_mb_is_refused_at_once(run, tmp_path):
@@ -248,8 +240,7 @@ def test_terminals_that_are_given_need_no_height(run, tmp_path, given):
     """With more than three separate conductors each was asked for, even where each was given."""
     files = stacked(tmp_path, **FOUR, **FILMS)
     ends = [word for name, end in given.items() for word in ("--terminal", f"{name}={end}")]
-    said = run("import", *files, *MAP_FOUR, "--name", "four", *ends)
-    assert (said.code, said.err) == (0, "")
+    assert run("import", *files, *MAP_FOUR, "--name", "four", *ends).clean
     ends = {b.name: b.terminal for b in load(Path("four.yaml")).drawn.bodies if b.name in FOUR}
     two = given.get("two", "middle").replace("none", "")
     assert ends == {"low": "bottom", "one": "", "two": two, "up": "top"}
@@ -292,8 +283,9 @@ def test_without_a_map_nothing_is_imported(run, plates):
     files = plates()
     before = sorted(Path().iterdir())
     said = run("import", *files, "--unit", "mm")
-    assert said.code == WRONG_INPUT
-    assert "expected sensorgen import low.stl film.stl up.stl --unit mm --map low=MATERIAL --map film=x60" in said.line
+    assert (
+        "expected sensorgen import low.stl film.stl up.stl --unit mm --map low=MATERIAL --map film=x60" in said.refusal
+    )
     assert said.out == run("import", *files, "--unit", "mm", "--list").out
     assert sorted(Path().iterdir()) == before
 
@@ -312,9 +304,7 @@ def test_the_command_that_a_list_ends_with_can_be_pasted(run, plates):
 def test_a_list_writes_no_picture(run, plates):
     files = plates(up=(0.5, 1.0))
     before = sorted(Path().iterdir())
-    said = run("import", *files, "--unit", "mm", "--list")
-    assert said.code == WRONG_INPUT
-    assert "overlap" in said.line
+    assert "overlap" in run("import", *files, "--unit", "mm", "--list").refusal
     assert sorted(Path().iterdir()) == before
     assert run("import", *files, "--unit", "mm", *PLATES).code == WRONG_INPUT
     assert [p.name for p in Path().iterdir() if p not in before] == ["low-faults.svg"]
@@ -354,8 +344,7 @@ def test_materials_of_a_pack_beside_the_design_are_suggested_and_taken(run, plat
     files = [Path(name).rename(f"{name[:-4]}-eel.stl" if name != "film.stl" else name).name for name in plates()]
     listed = json.loads(run("import", *files, "--unit", "mm", "--list", "--json").out)["bodies"]
     assert [body["material"] for body in listed] == ["eel", "x60", "eel"]
-    said = run("import", *files, "--unit", "mm", "--name", "own", "--map", "film=x60@1", "--map", "*=eel@2")
-    assert (said.code, said.err) == (0, "")
+    assert run("import", *files, "--unit", "mm", "--name", "own", "--map", "film=x60@1", "--map", "*=eel@2").clean
     Path("a.gcode").write_text("G90\nM83\n", encoding="utf-8")
     assert run("gcode", "check", "a.gcode", "--material", "2=eel").code != WRONG_INPUT
     assert "unknown material 'eal'; did you mean 'eel'?" in run("gcode", "check", "a.gcode", "--material", "2=eal").line
@@ -410,12 +399,10 @@ def test_rounded_corners_cost_the_resistance_alone(run, models):
 def test_the_whole_walk_in_an_empty_folder(run, models, program):
     """From a STEP of another program to a sliced print, with commands alone."""
     program("prusa-slicer", "prusa-slicer")
-    said = run("import", models / "filleted.step", "--map", "pad=x60@1", "--map", "*=etpu@2")
-    assert said.code == 0
+    said = run("import", models / "filleted.step", "--map", "pad=x60@1", "--map", "*=etpu@2").ok
     assert "30 x 10 x 1.6 mm" in said.words
     assert run("check", "filleted.yaml").code == 0
-    predicted = run("predict", "filleted.yaml", "--json")
-    assert predicted.code == 0, predicted.err
+    predicted = run("predict", "filleted.yaml", "--json").ok
     found, plate_f = json.loads(predicted.out), 8.8541878128e-12 * 4.68 * 9.4e-3 * 30e-3 / 0.8e-3
     for one in (found, found["drawn"]):  # fringes at the narrower plate's edges, a fillet beside them
         assert plate_f < one["capacitance"]["value"] < 1.12 * plate_f
@@ -423,8 +410,7 @@ def test_the_whole_walk_in_an_empty_folder(run, models, program):
     assert run("build", "filleted.yaml", "--no-cad").code == 0
     made = {path.name for path in Path("out/filleted").iterdir()}
     assert {"filleted.prusa.3mf", "filleted.cura.3mf", "filleted.svg", "design.json"} <= made
-    sliced = run("slice", "filleted.yaml")
-    assert sliced.code == 0, sliced.err
+    assert run("slice", "filleted.yaml").ok
     assert Path("out/filleted/filleted.prusa.gcode").stat().st_size > 10_000
 
 
@@ -440,10 +426,8 @@ def test_a_sensor_cut_to_an_outline_is_sliced_and_predicted(run, program):
     program("prusa-slicer", "prusa-slicer")
     Path("oval.svg").write_text(ELLIPSE, encoding="utf-8")
     words = ("reference", "--border", "oval.svg", "--name", "oval")
-    sliced = run("slice", *words)
-    assert (sliced.code, sliced.err) == (0, "")
-    said = run("predict", *words, "--json")
-    found = json.loads(said.out)
+    assert run("slice", *words).clean
+    found = run("predict", *words, "--json").json
     assert "oval.prusa.gcode" in json.dumps(found)
     area, eps = np.pi * 5e-3 * 3e-3, 4.68
     assert found["capacitance"]["value"] == pytest.approx(8.8541878128e-12 * eps * area / 0.6e-3, rel=0.02)

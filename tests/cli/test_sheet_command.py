@@ -15,8 +15,7 @@ WORDS = ("sheet", "reference", "--size", "60x60", "--frequencies", "100kHz,1MHz"
 
 
 def test_it_says_which_contacts_locate(run):
-    said = run(*WORDS, "--contacts", "corners")
-    assert said.code == 0, said.err
+    said = run(*WORDS, "--contacts", "corners").ok
     assert "corners" in said.out
     assert "locates a press" in said.out
     assert "at 100 kHz" in said.out
@@ -84,8 +83,7 @@ def test_a_bonded_film_tells_less_of_force(run):
 
 
 def test_maps_are_drawn(run, tmp_path):
-    said = run(*WORDS, "--contacts", "two-edges", "--plot", "maps")
-    assert said.code == 0, said.err
+    said = run(*WORDS, "--contacts", "two-edges", "--plot", "maps").ok
     (picture,) = (tmp_path / "maps").iterdir()
     assert picture.name in said.out
     assert picture.read_bytes().startswith(b"\x89PNG")

@@ -1,13 +1,10 @@
 """``sensorgen stack``, in a group of its own so that it does not matter what else there is."""
 
-import json
-
 import pytest
 
 
 def test_it_prints_tables(run):
-    said = run("stack", "double", "--isolation", "0.3")
-    assert (said.code, said.err) == (0, "")
+    said = run("stack", "double", "--isolation", "0.3").clean
     for word in ("lower film alone", "difference alone", "0.3 mm", "bare", "top driven", "bridge", "doubt:"):
         assert word in said.out
     assert max(map(len, said.out.splitlines())) <= 80
@@ -41,8 +38,7 @@ def test_cells_of_its_tables_stay_apart(run, words):
 
 
 def test_its_json_is_plain(run):
-    said = run("stack", "tri", "--dielectric", "0.1", "--force", "3N", "--position", "45", "--json")
-    found = json.loads(said.out)
+    found = run("stack", "tri", "--dielectric", "0.1", "--force", "3N", "--position", "45", "--json").json
     assert (found["force_n"], found["position_m"]) == (3.0, pytest.approx(0.045))
     assert [row["frequency_hz"] for row in found["readings_ohm"]][-1] == 99.7e3
     assert {row["wiring"] for row in found["touch"]} == {"top driven", "top at ground", "bridge, either way round"}

@@ -17,8 +17,7 @@ def few(monkeypatch):
 
 
 def test_page_and_markdown_are_written(run, few, tmp_path):
-    said = run("thesis", "-o", "out/here")
-    assert said.code == 0
+    said = run("thesis", "-o", "out/here").ok
     assert said.out.split("\n")[:2] == ["out/here/thesis.html", "out/here/thesis.md"]
     assert said.out.split("\n")[2] == "3 misprint confirmed, 3 differs, 1 cannot be reproduced"
     assert (tmp_path / "out/here/thesis.html").read_text("utf-8") == thesis.html(few)
@@ -45,6 +44,4 @@ def test_what_nobody_can_explain_is_told_and_ends_with_1(run, few, monkeypatch):
 def test_wrong_words(run, few, tmp_path):
     assert "did you mean 'html'" in run("thesis", "--format", "htm").line
     (tmp_path / "file").write_text("x")
-    said = run("thesis", "-o", "file/below")
-    assert said.code == 2
-    assert "cannot write 'file/below/thesis.html'" in said.line
+    assert "cannot write 'file/below/thesis.html'" in run("thesis", "-o", "file/below").refusal

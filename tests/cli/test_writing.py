@@ -58,8 +58,7 @@ def assert_manifest_verifies(found):
 def test_a_forced_short_is_written_whole_and_elsewhere_to_the_same_bytes(run, start, tmp_path, contents):
     """Nothing is predicted of the drawing. Elsewhere: another process, with a hash seed and a folder of its own."""
     words = ("build", "tri", "--size", "6x6", "--dielectric", "0", "--no-cad", "--force", "--name", "x")
-    said = run(*words)
-    assert (said.code, said.err) == (0, "")
+    assert run(*words).clean
     found = contents(tmp_path / "out/x")
     process = start(*words, "--out", "b/c", PYTHONHASHSEED="1")
     process.communicate()
@@ -74,9 +73,10 @@ def test_a_forced_short_is_written_whole_and_elsewhere_to_the_same_bytes(run, st
 @pytest.mark.parametrize("out", ["x/deeper", ""])  # the last is the design's own folder
 def test_output_folder_is_a_file(run, tmp_path, out):
     (tmp_path / "x").write_text("mine")
-    said = run(*BUILD, "--out", out)
-    assert said.code == 2
-    assert "'x' is a file; expected a folder: move it away, or name another place with --out" in said.line
+    assert (
+        "'x' is a file; expected a folder: move it away, or name another place with --out"
+        in run(*BUILD, "--out", out).refusal
+    )
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("x", "mine")]
 
 
@@ -91,9 +91,7 @@ def test_output_folder_is_a_link(run, tmp_path):
 
 @pytest.mark.parametrize("out", ["/proc/none", "/dev/null", "out\udcff/" + "b" * 300])
 def test_output_folder_that_cannot_be(run, tmp_path, out):
-    said = run(*BUILD, "--out", out)
-    assert said.code == 2
-    assert "name another place with --out" in said.line
+    assert "name another place with --out" in run(*BUILD, "--out", out).refusal
     assert not any(p.name.endswith(".part") for p in tmp_path.rglob("*"))
 
 
@@ -101,9 +99,10 @@ def test_read_only(run, disk, contents, both):
     place = disk("8m")
     assert run(*BUILD, *OLD, "--out", place).code == 0
     subprocess.run(["mount", "-o", "remount,ro", place], check=True)
-    said = run(*BUILD, *NEW, "--out", place)
-    assert said.code == 2
-    assert f"cannot write to '{place}/x': Read-only file system; name another place with --out" in said.line
+    assert (
+        f"cannot write to '{place}/x': Read-only file system; name another place with --out"
+        in run(*BUILD, *NEW, "--out", place).refusal
+    )
     assert contents(place) == {f"x/{name}": content for name, content in both[0].items()}
 
 
@@ -124,9 +123,10 @@ def test_disk_full(run, disk, contents, both):
 def test_a_write_that_breaks_off(fork, built, contents, both):
     """As on a full disk, but without needing one: no file may grow beyond the limit."""
     before = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (3_000, 3_000))"
-    said = fork(*BUILD, *NEW, before=before)
-    assert said.code == 2
-    assert said.line == "sensorgen: cannot write to 'out/x': File too large; name another place with --out"
+    assert (
+        fork(*BUILD, *NEW, before=before).refusal
+        == "sensorgen: cannot write to 'out/x': File too large; name another place with --out"
+    )
     assert contents(built) == {f"x/{name}": content for name, content in both[0].items()}
 
 
@@ -142,9 +142,7 @@ def test_drawing_breaks_off(fork, tmp_path):
 def test_drawing_to_what_is_no_file(run, tmp_path, place):
     (tmp_path / "folder").mkdir()
     os.mkfifo(tmp_path / "pipe")
-    said = run("draw", "tri", "--size", "6x6", "-o", place)
-    assert said.code == 2
-    assert f"cannot write '{place}'" in said.line
+    assert f"cannot write '{place}'" in run("draw", "tri", "--size", "6x6", "-o", place).refusal
     assert (tmp_path / "pipe").is_fifo()  # a device would have been replaced, too
 
 
@@ -280,8 +278,7 @@ def test_the_users_own_files_stay(run, tmp_path):
     for file in mine:
         file.write_text("mine")
     for period in (OLD, NEW):
-        said = run(*BUILD, *period, "--json")
-        assert said.code == 0
+        said = run(*BUILD, *period, "--json").ok
         assert not {"notes.txt", "profiles/mine.ini"} & set(json.loads(said.out)["files"])
     assert [file.read_text() for file in mine] == ["mine"] * 3
 
@@ -302,7 +299,5 @@ def test_a_folder_where_a_file_should_go(run, built, contents):
     (built / "x/x.svg").unlink()
     (built / "x/x.svg").mkdir()
     before = contents(built)
-    said = run(*BUILD, *NEW)
-    assert said.code == 2
-    assert "cannot write 'out/x/x.svg': a folder is in its place" in said.line
+    assert "cannot write 'out/x/x.svg': a folder is in its place" in run(*BUILD, *NEW).refusal
     assert contents(built) == before
