@@ -9,7 +9,8 @@ import pytest
 
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design.design import make
-from sensorgen.design.tip import Tip, TipData
+from sensorgen.design.effects import TipData
+from sensorgen.design.tip import Tip
 from sensorgen.prediction.compression_law import case_of, solved
 from sensorgen.prediction.mesh_ladder import COARSEST, USUAL, drawn, pressed
 

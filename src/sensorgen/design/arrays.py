@@ -19,7 +19,8 @@ from math import ceil
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.design.tip import EVEN, TipData
+from sensorgen.design.effects import TipData
+from sensorgen.design.tip import EVEN
 from sensorgen.scene.lettering import LINE_DOTS, runs
 from sensorgen.scene.scene import (
     SLIVER_MM,

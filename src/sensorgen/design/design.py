@@ -27,10 +27,11 @@ from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, problem, shown, stated
 from sensorgen.design import borders, imported, packs, shapes
 from sensorgen.design import materials as material_files
+from sensorgen.design.effects import Effects, TipData
 from sensorgen.design.packs import Kind
 from sensorgen.design.printer import Pattern, Printer, Quality, load_printer, load_quality
 from sensorgen.design.profile import Profile, with_own
-from sensorgen.design.tip import EVEN, STIFF, Effects, TipData
+from sensorgen.design.tip import EVEN, STIFF
 from sensorgen.scene.scene import Envelope, Fill, Scene
 
 if TYPE_CHECKING:

@@ -22,8 +22,9 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
+from sensorgen.design.effects import GUESS, Effects
 from sensorgen.design.materials import PIEZORESISTANCE
-from sensorgen.design.tip import EVEN, GUESS, TOPS, Effects
+from sensorgen.design.tip import EVEN, TOPS
 from sensorgen.design.values import ENDS, MaterialValue, material_value, piezoresistance, resistivities, spread
 from sensorgen.design.walls import rule, rules
 from sensorgen.models import pressure

@@ -16,7 +16,8 @@ from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
-from sensorgen.design.tip import WORDS, Effects
+from sensorgen.design.effects import Effects
+from sensorgen.design.tip import WORDS
 from sensorgen.design.values import ASSUMED, ENDS, MaterialValue, assumed, lead_ranges
 from sensorgen.models import line, refusal
 from sensorgen.models.compression import Compression
