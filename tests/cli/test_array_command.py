@@ -55,15 +55,6 @@ def test_a_virtual_step_is_inverted(run, file, tmp_path):
     assert float(rows[30]["force_n"]) > 20
 
 
-def test_build_writes_the_wires(run, file, tmp_path, monkeypatch):
-    monkeypatch.setenv("SENSORGEN_SLICER", "none")
-    (tmp_path / "p.yaml").write_text("shape: array\nparameters: {length_mm: 20, width_mm: 20}\n")
-    assert run("build", "p.yaml", "--no-cad").ok
-    rows = list(csv.DictReader((tmp_path / "out" / "p" / "wires.csv").read_text().splitlines()))
-    assert [row["track"] for row in rows] == ["r2", "r1", "c1", "c2"]
-    assert {"p.prusa.3mf", "p.html", "check.json"} <= {path.name for path in (tmp_path / "out" / "p").iterdir()}
-
-
 @pytest.mark.parametrize(
     ("words", "answer"),
     [

@@ -524,12 +524,6 @@ def test_a_design_file_is_a_target(tmp_path):
     assert [(one["electrode_mm"], one["dielectric_mm"]) for one in wanted.also] == [(0.4, 0.6), (0.3, 0.7)]
 
 
-def test_neither_a_shape_nor_a_file(run):
-    said = run("optimise", "trj")
-    assert said.code == 2
-    assert said.line.startswith("sensorgen: unknown shape or file of a target 'trj'; did you mean 'tri'?")
-
-
 def test_the_template_locates(tmp_path, monkeypatch):
     """The plate of before could not; this one has the best known design for it."""
     monkeypatch.chdir(tmp_path)

@@ -46,12 +46,6 @@ def test_a_turned_sensor_is_the_same_sheet(run):
     assert x["doubts"][-1] == doubt
 
 
-def test_twice_the_noise_is_twice_the_error(run):
-    said = (run(*WORDS, "--contacts", "corners", "--json", "--noise", noise) for noise in ("0.1%", "0.2%"))
-    one, two = (json.loads(each.out)["contacts"]["corners"] for each in said)
-    assert two["sigma_x_m"][1][2] == pytest.approx(2 * one["sigma_x_m"][1][2], rel=1e-6)
-
-
 def test_contacts_of_ones_own_are_the_same_as_those_with_a_name(run):
     """Pads of a tenth of the side in all corners, and an edge: what `corners` and `one-edge` are."""
     corners = [w for x in ("0-6", "54-60") for y in ("0-6", "54mm-60mm") for w in ("--pad", f"{x},{y}")]

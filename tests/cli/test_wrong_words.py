@@ -6,6 +6,7 @@ REFUSED = {  # by the words that they follow
     "": [
         (["bild", "tri"], "unknown command 'bild'; did you mean 'build'?"),
         (["build", "trj"], "unknown shape 'trj'; did you mean 'tri'?"),
+        (["optimise", "trj"], "unknown shape or file of a target 'trj'; did you mean 'tri'?"),
         (["build", "TRI"], "unknown shape 'TRI'; did you mean 'tri'?"),
         (["build", "tri", "--dielectrik", "0.2"], "unknown option '--dielectrik'; did you mean '--dielectric'?"),
         (["list", "material"], "did you mean 'materials'?"),
