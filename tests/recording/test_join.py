@@ -168,6 +168,7 @@ def test_a_rigs_log_in_other_words(tmp_path):
         ("time_s,set_force_n\n1,2\n", "set_position_mm is not there once"),
         ("time_s,set_force_n,set_position_mm\n1,x,3\n", "row 2, column set_force_n: 'x' is not a number"),
         ("time_s,set_force_n,set_position_mm\n2023-05-04T12:00:00,1,3\n", "is not a number"),
+        ("time_s,set_force_n,set_position_mm\nnoon,1,3\n", "row 2, column time_s: 'noon' is not a number"),
         ("time_s,set_force_n,set_position_mm\n1,2,3,4\n", "row 2: 4 cells, but the header has 3"),
         ("time_s,set_force_n,set_position_mm\n", "no rows"),
         ("time_s,set_force_n,set_position_mm\n1,inf,3\n", "is not finite"),
