@@ -141,10 +141,7 @@ def _text(data: JSON) -> str:
 @cache
 def _version() -> str:
     """Hash of the source code that decides an answer, and the version of sensorgen."""
-    here = Path(__file__).parents[1]
-    files = sorted(f for name in _SOURCES for f in _code(here / name))
-    return sha256(b"".join([__version__.encode(), *(f.read_bytes() for f in files)])).hexdigest()
-
-
-def _code(place: Path) -> list[Path]:
-    return [place] if place.is_file() else [f for f in place.rglob("*") if f.suffix in (".py", ".yaml")]
+    places = [Path(__file__).parents[1] / name for name in _SOURCES]
+    files = (f for place in places for f in ([place] if place.is_file() else place.rglob("*")))
+    code = sorted(f for f in files if f.suffix in (".py", ".yaml"))
+    return sha256(b"".join([__version__.encode(), *(f.read_bytes() for f in code)])).hexdigest()

@@ -146,7 +146,7 @@ FIRST_WITH_FILMS = 22  # iteration from which on the thesis writes films into na
 _UNBAKED = re.compile(r"\b(not|un|never)[\s-]*baked\b|\bbefore (the )?bak(e|ing)\b", re.IGNORECASE)
 
 
-class Named(NamedTuple):
+class NamedSpecimen(NamedTuple):
     """A specimen by its name.
 
     Attributes
@@ -165,7 +165,7 @@ class Named(NamedTuple):
     doubts: tuple[str, ...] = ()
 
 
-def named(written: str, log: Log | None = None) -> Named:
+def named(written: str, log: Log | None = None) -> NamedSpecimen:
     """Specimen by its name.
 
     Parameters
@@ -183,7 +183,7 @@ def named(written: str, log: Log | None = None) -> Named:
     bound = log.bound(" ".join(written.split())) if log else None
     if bound:
         of = Specimen(**{key: getattr(bound, key) for key in SPECIMEN_COLUMNS})
-        return Named(of, bound.design_id, bound.design)
+        return NamedSpecimen(of, bound.design_id, bound.design)
     try:
         return _by_name(written)
     except BadInput as error:
@@ -356,10 +356,10 @@ def _design_of(kind: specimen_name.SpecimenName) -> Design | None:
 
 
 @lru_cache(maxsize=1 << 14)
-def _by_name(written: str) -> Named:
+def _by_name(written: str) -> NamedSpecimen:
     """Specimen by a name that is bound to no design; one without a film is usual in early iterations only."""
     name = specimen_name.parse(written)
     of = Specimen(specimen=name.name, **{key: getattr(name, key) for key in SPECIMEN_COLUMNS[1:]})
     design, film_expected = _design(name), (name.iteration or 0) < FIRST_WITH_FILMS
     doubts = tuple(doubt for doubt in name.assumed if doubt != specimen_name.NO_FILM or film_expected)
-    return Named(of, design.id() if design else "", design.name if design else "", doubts)
+    return NamedSpecimen(of, design.id() if design else "", design.name if design else "", doubts)
