@@ -73,14 +73,6 @@ def test_a_file_of_the_other_byte_order_is_the_same(tmp_path, tree):
     assert found.source.program == "TiePieLCR V1.0.3"
 
 
-def test_a_file_of_the_other_byte_order_that_is_not_turned_is_refused(tmp_path, tree):
-    content = bytearray(save(tmp_path / "run.mat", tree).read_bytes())
-    content[124:128] = b"\x01\x00MI"
-    (tmp_path / "wrong.mat").write_bytes(content)
-    with pytest.raises(BadInput, match=r"wrong\.mat: byte \d+: the file is damaged"):
-        read(tmp_path / "wrong.mat")
-
-
 def test_one_tone_squeezed_to_vectors_and_scalars(tmp_path):
     z = SHORT.impedance_ohm[BEFORE, 0]
     squeezed = {
