@@ -57,7 +57,7 @@ def test_a_reading_is_of_one_electrode_of_both_in_parallel_or_in_between():
     assert leaking.value == pytest.approx(sqrt(ends[0] * ends[1]), rel=1e-4)
 
 
-@pytest.mark.parametrize("leak", [0.0, 1e-12, 1e-6, 1e-3, 1.0, 1e3, inf])
+@pytest.mark.parametrize("leak", [0.0, 1e-12, 1e-3, 1e3, inf])
 def test_electrode_and_leak_come_back(leak):
     found = electrode_and_leak(along_ohm(700.0, leak), across_ohm(700.0, leak))
     assert found == (pytest.approx(700.0, rel=1e-9), pytest.approx(leak, rel=1e-6, abs=0))

@@ -220,6 +220,7 @@ def test_ratios_are_measured_over_the_predicted_value(of_thesis):
             assert ratio == pytest.approx(y / middle)
     sizes = [abs(math.log(r)) for r in column(found, "measured / predicted") if r is not None]
     assert sizes == sorted(sizes, reverse=True)
+    assert "made after the measurement" in " ".join(of_thesis.findings)
     ratios = [row.ratio for row in found.rows if 1 < row.measured_ohm < 5e4]
     assert 1 / 1.05 < median(ratios) < 1.05
     assert of_thesis.headline[0].startswith("Electrode resistance: measured as predicted (median of 51 readings; 49 ")
@@ -281,12 +282,6 @@ def test_resistivity_explains_what_it_must(of_thesis):
     assert row.share_percent == pytest.approx(100 * len(residuals) * mean**2 / sum(r * r for r in residuals), rel=1e-6)
     idle = {r.parameter: r.share_percent for r in explained.rows if r.kind == "electrode resistance"}
     assert idle["film permittivity"] == idle["all moduli"] == idle["film thickness"] == 0
-
-
-def test_it_says_that_predictions_were_made_afterwards(of_thesis, of_recorded):
-    assert "made after the measurement" in " ".join(of_thesis.findings)
-    assert "1 of 1 prediction was stored before anything was measured" in " ".join(of_recorded.findings)
-    assert any(row.which.startswith("stored 20") for row in table(of_recorded, "provenance").rows)
 
 
 def test_what_explains_recordings_is_what_is_wrong(of_recorded):
