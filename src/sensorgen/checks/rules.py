@@ -12,7 +12,7 @@ from sensorgen.checks.widths import TOUCH_MM, VANISHES, Layers, Slices
 from sensorgen.core.findings import SEVERITIES, Finding
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.scene.layers import faces_mm
-from sensorgen.scene.scene import Body, Point, Scene
+from sensorgen.scene.scene import Body, Point, Scene, extent
 
 
 def bed_findings(scene: Scene, printer: Printer) -> Iterator[Finding]:
@@ -129,14 +129,8 @@ def gap_findings(slices: Slices, printer: Printer, quality: Quality, gap_mm: flo
 
 def _neighbours(scene: Scene) -> list[tuple[tuple[float, float, Body], tuple[float, float, Body]]]:
     """Electrodes of two terminals, one above the other, each with its lowest and highest place [mm]."""
-    ends = [(*_ends(body), body) for body in scene.bodies if body.terminal]
+    ends = [(*extent(body.pieces, "z"), body) for body in scene.bodies if body.terminal]
     return [(a, b) for a, b in pairwise(sorted(ends, key=itemgetter(0))) if a[2].terminal != b[2].terminal]
-
-
-def _ends(body: Body) -> tuple[float, float]:
-    """Lowest and highest place of a body [mm]."""
-    lows, highs = zip(*(piece.span("z") for piece in body.pieces), strict=True)
-    return min(lows), max(highs)
 
 
 def _on_edge(pair: Pair, slices: Slices, gap_mm: float) -> bool:

@@ -21,7 +21,7 @@ from pydantic import Field
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.files import reading
 from sensorgen.core.records import Strict
-from sensorgen.scene.scene import Body, Envelope, Move, Piece, Point, Prism, Scene
+from sensorgen.scene.scene import Body, Envelope, Move, Piece, Prism, Scene, extent
 from sensorgen.scene.sections import sections
 
 SHAPE = "imported"
@@ -203,9 +203,9 @@ def halves(geometry: str, filled: Mapping[str, Filled]) -> list[dict[str, Any]]:
     """
     pieces = bodies(geometry).pieces
     shared = middle(filled)
-    low, high = _ends(piece for name in shared for piece in pieces[name])
-    lower = {name: own for name, own in pieces.items() if _ends(own)[1] <= high}
-    upper = {name: own for name, own in pieces.items() if _ends(own)[0] >= low}
+    low, high = extent((piece for name in shared for piece in pieces[name]), "z")
+    lower = {name: own for name, own in pieces.items() if extent(own, "z")[1] <= high}
+    upper = {name: own for name, own in pieces.items() if extent(own, "z")[0] >= low}
     if beside := sorted(n for n in pieces.keys() - shared if (n in lower) == (n in upper)):
         raise BadInput(
             f"{', '.join(beside)}: beside the middle electrode, which is from {low:g} to {high:g} mm; expected each "
@@ -218,18 +218,12 @@ def _half(
     geometry: str, pieces: Mapping[str, Sequence[Piece]], filled: Mapping[str, Filled], end: str
 ) -> dict[str, Any]:
     """Geometry and bodies of a sensor of some of the bodies, on the bed, of which the middle electrode is an end."""
-    low, high = _ends(piece for own in pieces.values() for piece in own)
+    low, high = extent((piece for own in pieces.values() for piece in own), "z")
     down, whole = Move(shift_mm=(0, 0, -low)), bodies(geometry)
     moved = {name: tuple(piece.moved(down) for piece in own) for name, own in pieces.items()}
     part = replace(whole, pieces=moved, size_mm=(*whole.size_mm[:2], high - low))
     ends = {n: filled[n].model_dump() | {"terminal": filled[n].terminal.replace("middle", end)} for n in pieces}
     return {"geometry": packed(text(part)), "bodies": ends}
-
-
-def _ends(pieces: Iterable[Piece]) -> Point:
-    """Lowest and highest place of pieces [mm]."""
-    lows, highs = zip(*(piece.span("z") for piece in pieces), strict=True)
-    return min(lows), max(highs)
 
 
 def check(geometry: str | None, filled: Mapping[str, Filled], given: Mapping[str, float | str]) -> None:

@@ -345,6 +345,12 @@ def shadow(piece: Piece, axis: str) -> Outline:
     return rectangle(*piece.span(first), *piece.span(second))
 
 
+def extent(pieces: Iterable[Piece], axis: str) -> tuple[float, float]:
+    """Lowest and highest place of pieces along an axis [mm]."""
+    lows, highs = zip(*(piece.span(axis) for piece in pieces), strict=True)
+    return min(lows), max(highs)
+
+
 def content(piece: Piece) -> list[object]:
     """Everything that a piece is, as plain data; of pieces of two kinds never the same."""
     return [getattr(piece, own.name) for own in fields(piece)]

@@ -12,7 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Mask, Real, Whole
-from sensorgen.scene.scene import AXES, PLANE, Body, Outline, Piece, Prism, Scene
+from sensorgen.scene.scene import AXES, PLANE, Body, Outline, Piece, Prism, Scene, extent
 from sensorgen.scene.sections import overlap, sections
 
 if TYPE_CHECKING:
@@ -300,14 +300,9 @@ def _fault(body: Body, mesh: Mesh) -> str:
         return f"encloses {got:.9g} mm3, not {exact:.9g} mm3"
     if (twice := _self_overlap_mm3(near.solid())) > (OVERLAP_MM + off) * area:
         return f"overlaps itself by {twice:.3g} mm3"
-    box = [*mesh.vertices_mm.min(0), *mesh.vertices_mm.max(0)]
-    return "" if np.allclose(box, _box_mm(body), rtol=0.0, atol=OVERLAP_MM + off) else "is not where it is drawn"
-
-
-def _box_mm(body: Body) -> list[float]:
-    """Enclosing box: the lowest x, y and z, then the highest [mm]."""
-    spans = np.array([[p.span(axis) for axis in AXES] for p in body.pieces])
-    return [*spans[..., 0].min(axis=0), *spans[..., 1].max(axis=0)]
+    ends = np.transpose([mesh.vertices_mm.min(0), mesh.vertices_mm.max(0)])
+    drawn = [extent(body.pieces, axis) for axis in AXES]
+    return "" if np.allclose(ends, drawn, rtol=0.0, atol=OVERLAP_MM + off) else "is not where it is drawn"
 
 
 def _off_mm(body: Body) -> float:
