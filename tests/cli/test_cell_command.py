@@ -20,16 +20,11 @@ RECT = {case["d"]: case["C_F"] / 4e-6 for case in KNOWN["rect"]}
 LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))"
 
 
-def answer(said):
-    assert said.code == 0, said.err
-    return json.loads(said.out)
-
-
 @pytest.mark.own_cache
 @pytest.mark.parametrize("film", [0.1, 0.2])
 @pytest.mark.parametrize("accuracy", ["1e-2", "1e-6"])
 def test_bounds_hold_the_reference_and_are_as_near_as_asked(run, film, accuracy):
-    found = answer(run("cell", "tri", "--drawn", "--dielectric", film, "--accuracy", accuracy, "--json"))
+    found = run("cell", "tri", "--drawn", "--dielectric", film, "--accuracy", accuracy, "--json").ok.json
     lower, upper = found["lower_f_per_m2"], found["upper_f_per_m2"]
     assert lower * (1 - 1e-9) <= TRI[film] <= upper * (1 + 1e-9)
     assert (upper - lower) / TRI[film] <= float(accuracy) * (1 + 1e-9)
@@ -39,7 +34,7 @@ def test_bounds_hold_the_reference_and_are_as_near_as_asked(run, film, accuracy)
 
 def test_it_answers_for_the_print_unless_the_drawing_is_asked_for(run):
     """Each is another body, with a capacitance of its own."""
-    bodies = {word: answer(run("cell", "tri", *word, "--json")) for word in ((), ("--walls", "cura"), ("--drawn",))}
+    bodies = {word: run("cell", "tri", *word, "--json").ok.json for word in ((), ("--walls", "cura"), ("--drawn",))}
     printed = [f"printed, estimated ({slicer})" for slicer in ("PrusaSlicer, Arachne walls", "plain Cura")]
     assert [found["body"] for found in bodies.values()] == [*printed, "drawn"]
     assert len({found["lower_f_per_m2"] for found in bodies.values()}) == 3
@@ -47,7 +42,7 @@ def test_it_answers_for_the_print_unless_the_drawing_is_asked_for(run):
 
 
 def test_strips_in_three_dimensions(run):
-    found = answer(run("cell", "rect", "--drawn", "--dielectric", 0.2, "--accuracy", "5e-3", "--json"))
+    found = run("cell", "rect", "--drawn", "--dielectric", 0.2, "--accuracy", "5e-3", "--json").ok.json
     assert found["model"] == "fem3d"
     assert found["lower_f_per_m2"] <= RECT[0.2] * (1 + 3e-5)
     assert found["upper_f_per_m2"] >= RECT[0.2] * (1 - 3e-5)
@@ -56,15 +51,15 @@ def test_strips_in_three_dimensions(run):
 
 def test_set_values_reach_the_model(run):
     """Two of a kind: all permittivities times three give three times the capacitance."""
-    one = answer(run("cell", "tri", "--accuracy", "1e-5", "--json", "--set", "eps_x60=1.5", "--set", "eps_air=1"))
-    three = answer(run("cell", "tri", "--accuracy", "1e-5", "--json", "--set", "eps_x60=4.5", "--set", "eps_air=3"))
+    one = run("cell", "tri", "--accuracy", "1e-5", "--json", "--set", "eps_x60=1.5", "--set", "eps_air=1").ok.json
+    three = run("cell", "tri", "--accuracy", "1e-5", "--json", "--set", "eps_x60=4.5", "--set", "eps_air=3").ok.json
     assert three["lower_f_per_m2"] == pytest.approx(3 * one["lower_f_per_m2"], rel=1e-5, abs=0)
     values = {(v["material"], v["value"], v["source"]) for v in one["values"]}
     assert values == {("x60", 1.5, "set by the user"), ("air", 1, "set by the user")}
 
 
 def test_a_known_answer_loads_no_numbers(run, real):
-    first = answer(run("cell", "tri", "--drawn", "--json"))
+    first = run("cell", "tri", "--drawn", "--json").ok.json
     said = real("cell", "tri", "--drawn", "--json", before=LOADED)
     text, _, loaded = said.out.rpartition("loaded: ")
     assert not {"numpy", "ngsolve", "scipy", "build123d", "multiprocessing", "matplotlib"} & set(loaded.split())
@@ -75,7 +70,7 @@ def test_a_known_answer_loads_no_numbers(run, real):
 @pytest.mark.own_cache
 def test_no_cache_solves_anew_and_keeps_nothing(run):
     words = ("cell", "tri", "--drawn", "--json")
-    known = [answer(run(*words, *more))["known"] for more in (["--no-cache"], [], ["--no-cache"], [])]
+    known = [run(*words, *more).ok.json["known"] for more in (["--no-cache"], [], ["--no-cache"], [])]
     assert known == [False, False, False, True]
 
 
@@ -106,13 +101,13 @@ def no_solver(monkeypatch):
 
 
 def test_it_needs_no_optional_solver(run, no_solver):
-    found = answer(run("cell", "tri", "--drawn", "--dielectric", 0.1, "--accuracy", "1e-6", "--json"))
+    found = run("cell", "tri", "--drawn", "--dielectric", 0.1, "--accuracy", "1e-6", "--json").ok.json
     assert (found["model"], found["reached"]) == ("fem2d", True)
     assert found["lower_f_per_m2"] <= TRI[0.1] <= found["upper_f_per_m2"]
 
 
 def test_predict_takes_an_accuracy(run):
-    found = answer(run("predict", "tri", "--drawn", "--dielectric", 0.1, "--accuracy", "1e-3", "--json"))
+    found = run("predict", "tri", "--drawn", "--dielectric", 0.1, "--accuracy", "1e-3", "--json").ok.json
     bounds, area_m2 = found["capacitance"]["model"], 100e-3 * 10e-3
     assert [level["chosen"] for level in found["plan"]["levels"] if level["name"] == "cell"] == ["fem2d"]
     assert bounds["lower"] <= TRI[0.1] * area_m2 <= bounds["upper"]
@@ -141,10 +136,10 @@ def test_a_sweep_as_csv_and_json(run):
         film = float(row["dielectric_mm"])
         assert float(row["lower_f_per_m2"]) <= TRI[film] <= float(row["upper_f_per_m2"])
         assert (row["model"], row["reached"], row["reason"]) == ("fem2d", "true", "")
-    found = answer(run(*SWEEP, "--json"))
+    found = run(*SWEEP, "--json").ok.json
     assert [entry["known"] for entry in found] == [True, True]
     assert [repr(entry["lower_f_per_m2"]) for entry in found] == [row["lower_f_per_m2"] for row in rows]
-    longer = answer(run("cell", "tri", "--drawn", "--sweep", "dielectric_mm=0.1,0.15,0.2", "--json"))
+    longer = run("cell", "tri", "--drawn", "--sweep", "dielectric_mm=0.1,0.15,0.2", "--json").ok.json
     assert [entry["known"] for entry in longer] == [True, False, True]
     lowers = [entry["lower_f_per_m2"] for entry in longer]
     assert lowers == sorted(lowers, reverse=True)
@@ -152,7 +147,7 @@ def test_a_sweep_as_csv_and_json(run):
 
 
 def test_a_sweep_over_a_material_and_over_words(run):
-    found = answer(run("cell", "reference", "--sweep", "eps_x60=2,4", "--json", "--jobs", "1"))
+    found = run("cell", "reference", "--sweep", "eps_x60=2,4", "--json", "--jobs", "1").ok.json
     assert [entry["eps_x60"] for entry in found] == [2, 4]
     assert found[1]["lower_f_per_m2"] == pytest.approx(2 * found[0]["lower_f_per_m2"], rel=1e-12, abs=0)
     words = ("--sweep", "along=xy,yx", "--model", "columns", "--accuracy", "2", "--jobs", "1")

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 import math
 
 import pytest
@@ -12,17 +11,12 @@ from sensorgen.core.units import EPS0_F_PER_M
 PLATE_F_PER_M2 = EPS0_F_PER_M * 4.68 / 0.6e-3
 
 
-def answer(said):
-    assert said.code == 0, said.err
-    return json.loads(said.out)
-
-
 def middle(found):
     return (found["loss_lower_f_per_m2"] + found["loss_upper_f_per_m2"]) / 2
 
 
 def test_a_plate_loses_what_its_dielectric_does(run):
-    found = answer(run("cell", "reference", "--set", "loss_x60=0.02", "--json", "--accuracy", "1e-6"))
+    found = run("cell", "reference", "--set", "loss_x60=0.02", "--json", "--accuracy", "1e-6").ok.json
     assert found["lower_f_per_m2"] <= PLATE_F_PER_M2 <= found["upper_f_per_m2"]
     assert middle(found) == pytest.approx(0.02 * PLATE_F_PER_M2, rel=1e-6, abs=0)
     assert found["tan_delta"] == pytest.approx([0.02, 0.02], rel=1e-4)
@@ -34,13 +28,13 @@ def test_a_plate_leaks_by_its_frequency(run):
     """G = sigma A / d beside C: minus Im C = G / omega."""
     words = ("cell", "reference", "--set", "resistivity_x60=1e6", "--json", "--accuracy", "1e-6", "--frequency")
     for typed, hertz in (("1.1kHz", 1100.0), ("50", 50.0)):
-        found = answer(run(*words, typed))
+        found = run(*words, typed).ok.json
         assert middle(found) == pytest.approx(1 / (1e6 * 0.6e-3) / (2 * math.pi * hertz), rel=1e-6, abs=0)
         assert found["frequency_hz"] == hertz
 
 
 def test_lossless_designs_say_nothing_of_losses(run):
-    found = answer(run("cell", "reference", "--json", "--frequency", "1kHz"))
+    found = run("cell", "reference", "--json", "--frequency", "1kHz").ok.json
     assert found["loss_lower_f_per_m2"] is found["tan_delta"] is found["frequency_hz"] is None
 
 
