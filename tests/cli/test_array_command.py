@@ -26,7 +26,7 @@ def test_it_says_what_is_resolved(run, file):
                   "edges of the tracks are 21.3 %", "contact resistance"):  # fmt: skip
         assert words in said.words
     assert "share a factor 0.15 to 1.6: stiffness by its sources" in said.words
-    data = json.loads(run("array", file, "--json", "--pressure", "50").out)
+    data = run("array", file, "--json", "--pressure", "50").json
     assert data["shared_factor"] == pytest.approx([0.15, 1.632], rel=1e-2)
     assert data["pressure_kpa"] == 50
     assert np.shape(data["sigma_kpa"]) == (3, 4)

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("unpressed")  # gaps, capacitances at rest 
 
 
 def predicted(run, *words):
-    return json.loads(run("predict", *words, "--json").out)
+    return run("predict", *words, "--json").json
 
 
 @pytest.mark.usefixtures("at_rest")
@@ -196,19 +196,19 @@ def test_a_file_of_another_design_is_not_taken_without_a_word(run, tmp_path):
     other = make({"shape": "reference", "name": "other", "parameters": SIZE | {"dielectric_mm": 0.4}})
     file.write_text(filled(other))
     how = ("--gcode", str(file), "--json")
-    assert json.loads(run("predict", *plate, "--dielectric", "0.4", *how).out)["doubts"] == []
+    assert run("predict", *plate, "--dielectric", "0.4", *how).json["doubts"] == []
     record = {"name": "other", "design": other.id(), "sha256": sha256(file.read_bytes()).hexdigest()}
     file.with_name("other.gcode.json").write_text(json.dumps(record))
-    assert json.loads(run("predict", *plate, "--dielectric", "0.4", *how).out)["doubts"] == []
+    assert run("predict", *plate, "--dielectric", "0.4", *how).json["doubts"] == []
     lower = run("predict", *plate, "--dielectric", "0.3", *how)
     assert (lower.code, json.loads(lower.out)["status"]) == (2, "not predicted")
     assert "prints up to Z 1 mm, above the top of reference-length12-width8-dielectric0.3 at 0.9 mm" in lower.line
     same = (*plate, "--dielectric", "0.2", "--electrode", "0.4")
-    doubt, of_bodies = json.loads(run("predict", *same, *how).out)["doubts"]
+    doubt, of_bodies = run("predict", *same, *how).json["doubts"]
     assert of_bodies.startswith("tool 4 prints 96 mm2")
     assert doubt.startswith("the record beside other.gcode names another design, 'other'")
     assert doubt in run("export", *same, "--gcode", str(file), "-o", "body.stl").out
     assert doubt in {f.message for f in registered(make({"shape": "reference", "parameters": SIZE | {
         "dielectric_mm": 0.2, "electrode_mm": 0.4}}), file).findings()}  # fmt: skip
-    higher = json.loads(run("predict", *plate, "--dielectric", "0.6", *how).out)
+    higher = run("predict", *plate, "--dielectric", "0.6", *how).json
     assert any("is missing: nothing of" in one for one in higher["doubts"])

@@ -33,7 +33,7 @@ def test_a_batch_and_its_verification(run, plan):
     assert max(map(len, said.out.splitlines())) <= 120
     said = run("batch", "verify", "out/plan")
     assert (said.code, said.out, said.err) == (0, "as recorded\n", "")
-    assert json.loads(run("batch", "verify", "out/plan", "--json").out) == {
+    assert run("batch", "verify", "out/plan", "--json").json == {
         "missing": [], "changed": [], "extra": [], "links": [], "record": [],
     }  # fmt: skip
     Path("out/plan/plate.svg").write_text("other", encoding="utf-8")

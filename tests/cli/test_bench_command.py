@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 
 import made
 import numpy as np
@@ -67,7 +66,7 @@ def test_a_recording_shows_what_its_presses_change(run, files, lived):
     assert "14 zero, " in said.out
     assert "2 with errors" in said.out
     assert "rig's clock + 3.2" in said.out
-    data = json.loads(run("bench", "show", "run.mat", "--rig", files, "--json").out)
+    data = run("bench", "show", "run.mat", "--rig", files, "--json").json
     assert data["rig"] == {"rows": len(rig(files).time_s), "errors": 2}
     assert data["counts"]["zero"] == 14
     assert 0.02 < data["drift"] < 0.06
@@ -77,7 +76,7 @@ def test_a_recording_shows_what_its_presses_change(run, files, lived):
     off = np.array([p["difference_im_ohm"] for p in presses]) - changed(lived).imag
     pulls = off / np.array([p["error_im_ohm"] for p in presses])
     assert 0.7 < np.sqrt(np.mean(pulls**2)) < 1.3
-    kept = json.loads(run("bench", "show", "run.mat", "--rig", files, "--json", "--keep-drift").out)
+    kept = run("bench", "show", "run.mat", "--rig", files, "--json", "--keep-drift").json
     assert kept["drift"] is None
     worse = np.array([p["difference_im_ohm"] for p in kept["presses"]]) - changed(lived).imag
     assert np.mean(np.abs(worse)) > 2 * np.mean(np.abs(off))
@@ -88,7 +87,7 @@ def test_without_a_rig_presses_are_found_in_the_readings_and_their_forces_are_no
     said = run("bench", "show", "run.mat")
     assert "found by the readings alone" in said.out
     assert "force [N]" not in said.out
-    presses = json.loads(run("bench", "show", "run.mat", "--json").out)["presses"]
+    presses = run("bench", "show", "run.mat", "--json").json["presses"]
     assert len(MADE) - 1 <= len(presses) <= len(MADE)
     assert all(p["force_n"] is None for p in presses)
     assert run("bench", "show", "run.mat", "--plot", "out").out.splitlines()[-1] == "out/time.png"
@@ -146,7 +145,7 @@ def test_noise_alone_has_no_presses(run, tmp_path):
     rows = "".join(f"{k / 50},{100 + x:.6f},{-50 + y:.6f}\n" for k, (x, y) in enumerate(rng.normal(0, 0.1, (3000, 2))))
     (tmp_path / "a.csv").write_text("time_s,re_ohm_1kHz,im_ohm_1kHz\n" + rows)
     assert "nothing pressed" in run("bench", "show", "a.csv").out
-    (rest,) = json.loads(run("bench", "show", "a.csv", "--json").out)["rest"]
+    (rest,) = run("bench", "show", "a.csv", "--json").json["rest"]
     assert (rest["re_ohm"], rest["im_ohm"]) == pytest.approx((100, -50), abs=4 * 0.1 / 3000**0.5)
     assert rest["noise_re_ohm"] == pytest.approx(0.1, rel=0.06)
     assert rest["capacitance_f"] == pytest.approx(1 / (2 * np.pi * 1e3 * 50), rel=1e-3)

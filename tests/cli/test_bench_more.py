@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 import re
 import sys
 
@@ -49,7 +48,7 @@ def test_hysteresis_of_a_film_that_answers_slowly(run, tmp_path):
     assert lines[-1] == "ways.png"
     assert len([line for line in lines if "kHz" in line]) == 2 * len(SLOW)
     assert (tmp_path / "ways.png").read_bytes().startswith(b"\x89PNG")
-    data = json.loads(run("bench", "hysteresis", "slow.mat", "--rig", "slow.csv", "--json").out)
+    data = run("bench", "hysteresis", "slow.mat", "--rig", "slow.csv", "--json").json
     assert data["tones_hz"] == TONES.tolist()
     for k in (0, -1):
         shares = np.array([press["share_im"][k] for press in data["presses"]])
@@ -62,7 +61,7 @@ def test_hysteresis_of_a_film_that_answers_slowly(run, tmp_path):
 
 def test_a_film_that_answers_at_once_has_next_to_none(run, tmp_path):
     write(tmp_path, "fast", SLOW, creep=0.02, noise=2e-4, ramp_s=4.0)
-    data = json.loads(run("bench", "hysteresis", "fast.mat", "--rig", "fast.csv", "--json").out)
+    data = run("bench", "hysteresis", "fast.mat", "--rig", "fast.csv", "--json").json
     for press in data["presses"]:
         assert all(share < 5 * error for share, error in zip(press["share_im"], press["error_im"], strict=True))
         assert max(press["error_im"]) < 0.1
@@ -100,7 +99,7 @@ def test_sets_on_one_scale_and_in_a_table(run, tmp_path):
     shares = np.array([float(row["im_share_1.1kHz"]) for row in rows])
     assert (shares.min(), shares.max()) == (0, 1)
     assert not all((half.min(), half.max()) == (0, 1) for half in (shares[:6], shares[6:]))
-    data = json.loads(run(*words, "--json").out)
+    data = run(*words, "--json").json
     assert list(data["sets"]) == ["a.mat", "b.mat"]
     assert np.shape(data["sets"]["a.mat"]["difference_im_ohm"]) == (6, len(TONES))
     assert "1 --rig for 2 recordings" in run(*words[:-2]).line

@@ -259,7 +259,7 @@ def test_meters_alone_calibrate_what_they_can(bench):
     assert bench("log", "add", "S2", "--C", f"{2 * meter(truth, 1.1e3)[0]:.6g}pF@1.1kHz", "--unbaked").code == 0
     assert bench("log", "add", "S2", *metered(truth, 1.1e3), "--baked").code == 0
     assert bench("log", "add", "S2", "--y", "25.5k", "--baked").code == 0
-    found = json.loads(bench("calibrate", "S2", "--drawn", "--json").out)
+    found = bench("calibrate", "S2", "--drawn", "--json").json
     assert any("no recording: R, C and leak by meters alone" in note for note in found["notes"])
     assert any("2 readings of meters count, baked" in note for note in found["notes"])
     known = told(found, "capacitance")
@@ -267,7 +267,7 @@ def test_meters_alone_calibrate_what_they_can(bench):
     assert 1.06 < known["upper"] / known["lower"] < 1.1  # C differs by 2 % from session to session
     for f in TONES_HZ[1:]:
         assert bench("log", "add", "S2", *metered(truth, f), "--baked").code == 0
-    more = told(json.loads(bench("calibrate", "S2", "--drawn", "--dry-run", "--json").out), "capacitance")
+    more = told(bench("calibrate", "S2", "--drawn", "--dry-run", "--json").json, "capacitance")
     assert more["lower"] < 1.3 * 64.256829 < more["upper"]
     assert more["upper"] / more["lower"] > 1.05  # however many frequencies one session has
     assert bench("log", "withdraw", "reading", "3", "--reason", "slipped").code == 0
@@ -280,7 +280,7 @@ def test_a_negative_inductance_is_what_a_meter_shows_of_a_capacitor(bench, tmp_p
     (tmp_path / "ls.csv").write_text(f"Frequency (Hz),Ls (H),Q\n1100,{inductance:.8g},{1 / d:.8g}\n")
     assert bench("log", "specimen", "S2", "--design", "mine.yaml").code == 0
     assert "doubt" not in bench("log", "import", "ls.csv", "--specimen", "S2", "--instrument", "HP 4284A").out
-    known = told(json.loads(bench("calibrate", "S2", "--drawn", "--json").out), "capacitance")
+    known = told(bench("calibrate", "S2", "--drawn", "--json").json, "capacitance")
     assert known["lower"] < 64.256829 * np.exp(TRUTH.capacitance) < known["upper"] < 1.1 * known["lower"]
 
 

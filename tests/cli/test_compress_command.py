@@ -65,11 +65,11 @@ def test_a_known_answer_is_taken(run, monkeypatch):
 def test_boxes_are_pressed_in_three_dimensions(run, monkeypatch):
     """On one brick per box: within 8 % of the solution, and below the bound of springs."""
     monkeypatch.setattr(press3d, "BrickCounts", partial(press3d.BrickCounts, 1))
-    found = json.loads(run("compress", "rect", "--drawn", "--dielectric", "0.1", "--stress", "100", "--json").out)
+    found = run("compress", "rect", "--drawn", "--dielectric", "0.1", "--stress", "100", "--json").json
     assert (found["model"], found["converged_kpa"], found["faults"]) == ("press3d", 100.0, [])
     assert found["displacement_um"][1] == pytest.approx(6.56, rel=0.08)
     assert found["lower_f_per_m2"][0] * 4e-6 < 0.812343e-12 < found["upper_f_per_m2"][0] * 4e-6
-    springs = json.loads(run("compress", "rect", "--drawn", "--stress", "100", "--model", "springs", "--json").out)
+    springs = run("compress", "rect", "--drawn", "--stress", "100", "--model", "springs", "--json").json
     assert springs["lower_f_per_m2"] == [None, None]
     assert "at most this" in springs["doubts"][0]
     assert springs["displacement_um"][1] > found["displacement_um"][1]
@@ -86,7 +86,7 @@ def test_values_that_no_source_gives_are_told_with_their_ranges(run, model):
     if model == "press2d":
         pytest.importorskip("netgen")
     words = ("--drawn", "--stress", "10", "--model", model, "--material", "dielectric=bvoh", "--json")
-    doubts = json.loads(run("compress", "tri", *words).out)["doubts"]
+    doubts = run("compress", "tri", *words).json["doubts"]
     said = [doubt for doubt in doubts if doubt.endswith("no source gives it")]
     assert [doubt.partition(" of bvoh")[0] for doubt in said] == [
         "youngs_modulus_pa", "poisson_ratio", "relative_permittivity",
@@ -96,7 +96,7 @@ def test_values_that_no_source_gives_are_told_with_their_ranges(run, model):
 
 def test_three_electrodes_have_no_one_capacitance(run):
     assert "expected two, bottom and top" in run("compress", "double").line
-    springs = json.loads(run("compress", "double", "--model", "springs", "--stress", "10", "--json").out)
+    springs = run("compress", "double", "--model", "springs", "--stress", "10", "--json").json
     assert springs["displacement_um"][1] > 0
 
 
@@ -175,7 +175,7 @@ def test_a_plan_and_what_came_of_it(run):
     assert max(float(expected), float(reached)) <= 1e-2
     assert "all levels together" not in plan
     assert "(target 0.01)" in rest
-    found = json.loads(run(*PLATE_1, "1e-2", "--json").out)
+    found = run(*PLATE_1, "1e-2", "--json").json
     assert (found["reached"], found["accuracy"]) == (True, 1e-2)
     chosen = found["plan"]["levels"][0]
     assert (chosen["name"], chosen["chosen"]) == ("compression", "press2d, mesh x 0.7")
@@ -188,7 +188,7 @@ def test_a_plan_and_what_came_of_it(run):
 @needs_mesher
 def test_loads_of_next_to_nothing(run):
     """Linear from a thousandth of a pascal on, where rounding is as large as the load."""
-    found = json.loads(run("compress", "tri", "--stress", "1e-6,1e-4", "--json").out)
+    found = run("compress", "tri", "--stress", "1e-6,1e-4", "--json").json
     assert found["converged_kpa"] == 1e-4
     assert found["displacement_um"][2] == pytest.approx(100 * found["displacement_um"][1], rel=0.02)
 
@@ -238,9 +238,9 @@ def test_a_sweep_solves_only_what_is_not_known(run, asked, monkeypatch):
     for row, modulus in zip(rest, (3e6, 6e6), strict=True):
         assert row["youngs_modulus_x60"] == modulus
         assert row["displacement_um"] == pytest.approx([600 * p / modulus for p in (0, 5e4, 1e5)])
-    alone = json.loads(run(*PLATE[:4], "--stress", "50,100", "--set", "youngs_modulus_x60=6e6", "--json").out)
+    alone = run(*PLATE[:4], "--stress", "50,100", "--set", "youngs_modulus_x60=6e6", "--json").json
     assert rest[1] == alone | {key: rest[1][key] for key in ("youngs_modulus_x60", "design")}
-    longer = json.loads(run(*MODULI, "--json", "--sweep", "youngs_modulus_x60=3e6,5e6,6e6").out)
+    longer = run(*MODULI, "--json", "--sweep", "youngs_modulus_x60=3e6,5e6,6e6").json
     assert asked == [3e6, 6e6, 5e6]
     assert longer[::2] == rest
     run(*MODULI, "--no-cache", "--sweep", "youngs_modulus_x60=3e6,5e6")
@@ -302,9 +302,9 @@ def test_bounds_that_cross_stop_a_sweep_and_what_was_solved_is_known(run, asked)
     [(), pytest.param(("--infill", "80"), marks=pytest.mark.nightly)],  # two minutes
 )
 def test_predict_and_compress_give_a_plate_one_answer(run, body):
-    curve = json.loads(run("compress", "reference", *body, "--stress", "60", "--json").out)
+    curve = run("compress", "reference", *body, "--stress", "60", "--json").json
     rest = (curve["lower_f_per_m2"][0] + curve["upper_f_per_m2"][0]) / 2
-    found = json.loads(run("predict", "reference", *body, "--json").out)
+    found = run("predict", "reference", *body, "--json").json
     assert curve["rise_f_per_m2"][1] / rest / 60 == pytest.approx(found["sensitivity"]["value"], rel=1e-3)
     assert curve["model"] == ("infill" if "--infill" in body else "bonded")
     known = 2.1e-4 if "--infill" in body else 1.42e-5  # of 11.77 E
@@ -319,7 +319,7 @@ def test_a_solid_with_cogs_is_no_softer_or_stiffer_than_plates(run, command):
         ("cog", "--cog-width", "0.1", "--height", "0.02", "--dielectric", "0.3"),
         ("reference", "--dielectric", "0.32"),
     )
-    cog, plate = (json.loads(run(command, *shape, *words).out) for shape in shapes)
+    cog, plate = (run(command, *shape, *words).json for shape in shapes)
     if command == "predict":
         assert cog["sensitivity"]["value"] == pytest.approx(plate["sensitivity"]["value"], rel=0.05)
         assert cog["sensitivity"]["lower"] < 1.9e-6 < cog["sensitivity"]["upper"]

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 
 import pytest
 
@@ -24,7 +23,7 @@ def test_all_forms(run, tmp_path, name):
     assert (text.code, markdown.code) == (0, 0)
     assert max(map(len, text.out.splitlines())) <= 80
     assert "\n|" in markdown.out or "\n- " in markdown.out
-    assert json.loads(run(*words, "--json").out)
+    assert run(*words, "--json").json
     head, *rows = csv.reader(io.StringIO(run(*words, "--csv").out))
     assert rows
     assert {len(row) for row in rows} == {len(head)}

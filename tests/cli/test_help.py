@@ -112,7 +112,7 @@ def test_list_materials_shows_every_value_with_its_source(run):
 
 
 def test_every_source_is_explained(run):
-    said = json.loads(run("list", "sources", "--json").out)
+    said = run("list", "sources", "--json").json
     assert {source for name in materials.names() for source in materials.load(name).sources()} <= set(said)
     assert all(entry["about"] for entry in said.values())
 
@@ -130,7 +130,7 @@ def test_every_source_is_explained(run):
 def test_lists_are_complete(run, kind, names):
     said = run("list", kind).clean
     assert [line.split()[0] for line in said.out.splitlines() if line[0] != " "] == names
-    data = json.loads(run("list", kind, "--json").out)
+    data = run("list", kind, "--json").json
     assert list(data) == names
     assert all(entry["about"] for entry in data.values())
 

@@ -342,7 +342,7 @@ def test_materials_of_a_pack_beside_the_design_are_suggested_and_taken(run, plat
     (tmp_path / "materials").mkdir()
     (tmp_path / "materials" / "eel.yaml").write_text(text, "utf-8")
     files = [Path(name).rename(f"{name[:-4]}-eel.stl" if name != "film.stl" else name).name for name in plates()]
-    listed = json.loads(run("import", *files, "--unit", "mm", "--list", "--json").out)["bodies"]
+    listed = run("import", *files, "--unit", "mm", "--list", "--json").json["bodies"]
     assert [body["material"] for body in listed] == ["eel", "x60", "eel"]
     assert run("import", *files, "--unit", "mm", "--name", "own", "--map", "film=x60@1", "--map", "*=eel@2").clean
     Path("a.gcode").write_text("G90\nM83\n", encoding="utf-8")

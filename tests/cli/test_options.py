@@ -150,7 +150,7 @@ def test_json_of_check_holds_the_findings(run):
 
 
 def test_json_of_build(run, tmp_path):
-    data = json.loads(run("build", "tri", "--no-cad", "--json").out)
+    data = run("build", "tri", "--no-cad", "--json").json
     folder = tmp_path / data["folder"]
     assert sorted(data["files"]) == sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
     assert data["findings"] == json.loads((folder / "check.json").read_text())["findings"]

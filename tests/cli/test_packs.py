@@ -151,19 +151,19 @@ def test_where_each_comes_from(run, here, monkeypatch, tmp_path_factory):
     run("new", "shape", "zig", "--pack", "mine")
     run("pack", "trust", "mine")
     install(tmp_path_factory.mktemp("site"), monkeypatch)
-    entries = json.loads(run("list", "materials", "--json").out)
+    entries = run("list", "materials", "--json").json
     found = {name: (entries[name]["pack"], entries[name]["where"], entries[name]["version"]) for name in entries}
     assert found["eel"] == (here.name, "beside the design", "")
     assert found["lab-ink"] == ("lab", "installed", "2.1")
     assert found["x60"][:2] == ("thesis", "shipped")
     assert found["ninjatek-eel"][:2] == ("filaments", "shipped")
-    printers = json.loads(run("list", "printers", "--json").out)
+    printers = run("list", "printers", "--json").json
     assert {name: printers[name]["pack"] for name in printers} == {"diabase-h5": "thesis", "prusa-xl5": "others"}
-    shapes = json.loads(run("list", "shapes", "--json").out)
+    shapes = run("list", "shapes", "--json").json
     assert (shapes["zig"]["pack"], shapes["zig"]["where"]) == ("mine", "own")
     assert shapes["zig"]["file"] == str(packs.place() / "mine" / "shapes" / "zig.py")
     assert f"[pack lab 2.1, installed: {entries['lab-ink']['file']}]" in run("list", "materials").words
-    assert {"thesis", "mine", "lab"} <= set(json.loads(run("list", "packs", "--json").out))
+    assert {"thesis", "mine", "lab"} <= set(run("list", "packs", "--json").json)
     assert run("check", "tri", "--material", "electrode=lab-ink", "--tool", "lab-ink=1").code in (0, 1)
 
 
@@ -444,7 +444,7 @@ def test_planted_faults_are_found(run, here, what, old, new, expected):
 
 def test_a_fault_of_a_shape_is_one_finding_with_how_many_sensors_have_it(run, here):
     put(here, "shape", "zig", ("box(*whole, low, film)", "box(*whole, low, film + 0.02)"))
-    found = json.loads(run("pack", "test", ".", "--json").out)["findings"]
+    found = run("pack", "test", ".", "--json").json["findings"]
     assert [f["rule"] for f in found] == ["scene", "scene", "volume", "support"]
     assert found[0]["message"] == "film / blocks: overlap by 0.6 mm3 (in 13 of 13 sensors tried)"
 

@@ -91,10 +91,10 @@ def test_law_and_tip_reach_the_sensor(run, words, stiffer, tip):
 
 
 def test_axes_that_are_not_named(run):
-    forces = json.loads(run(*FREE, "--position", "50", "--json").out)
+    forces = run(*FREE, "--position", "50", "--json").json
     assert (forces["force_n"], forces["position_mm"]) == ([k / 10 for k in range(61)], [50])
     assert forces["frequency_hz"] == [1100, 2300, 5300, 10100, 19900, 49900, 99700]
-    places = json.loads(run(*FREE, "--length", "50", "--force", "1", "--json").out)
+    places = run(*FREE, "--length", "50", "--force", "1", "--json").json
     assert (places["force_n"], places["position_mm"]) == ([1], [k / 2 for k in range(101)])
 
 
@@ -109,7 +109,7 @@ def test_without_a_load(run):
     assert f"capacitance          69.1 pF ({math.floor(69.06 * least / 4.68)} to 110)" in said.out
     assert 69.06 * most / 4.68 + 5 < 110
     assert "top electrode        1.4 kohm (0.66 to 7.3)" in said.out  # 0.042 (0.02 to 0.088) ohm m, 4.3 kohm
-    found = json.loads(run(*FREE, "--json", "--frequencies", "1kHz,1MHz").out)
+    found = run(*FREE, "--json", "--frequencies", "1kHz,1MHz").json
     assert [row["frequency_hz"] for row in found["impedance"]] == [1e3, 1e6]
     assert "1 MHz" in run(*FREE, "--frequencies", "1MHz").out
 
@@ -164,7 +164,7 @@ def test_the_card_is_of_the_greatest_press_and_the_noise_asked_for(run):
     """Standard errors go with the noise: those of the plate at 0.1 % are 2.23 N and 225 mm."""
     slots = ["--material", "top_electrode=etpu@thesis-c.1-top", "--material", "bottom_electrode=etpu@thesis-c.1-bottom"]
     words = (*FREE, *PRESSES[:-2], *slots, "--noise", "1%", "--json")
-    found = json.loads(run(*words).out)["prediction"]["identifiability"]
+    found = run(*words).json["prediction"]["identifiability"]
     assert (found["noise"], found["press"]["force_n"], found["press"]["position_m"]) == (0.01, 6, 0.05)
     assert found["sigma_force_n"] == pytest.approx(22.3, rel=1e-3)
     assert found["sigma_position_m"] == pytest.approx(2.25, rel=1e-3)
@@ -173,12 +173,12 @@ def test_the_card_is_of_the_greatest_press_and_the_noise_asked_for(run):
 
 
 def test_the_verdict_on_a_cell_that_nobody_solved_says_so(run):
-    found = json.loads(run("predict", "tri", "--drawn", "--compression", "unconfined", "--json").out)["identifiability"]
+    found = run("predict", "tri", "--drawn", "--compression", "unconfined", "--json").json["identifiability"]
     said = "not known, as the cell was not solved, and is taken to deform as a solid plate;"
     assert found["verdict"].startswith(said)
     assert (found["senses_force"], found["locates"]) == (None, None)
     assert not any("triangles 2 mm apart" in change["change"] for change in found["changes"])
-    solved = json.loads(run("predict", "tri", "--drawn", "--json").out)["identifiability"]
+    solved = run("predict", "tri", "--drawn", "--json").json["identifiability"]
     assert (solved["senses_force"], solved["assumed"]) == ("yes", None)
 
 
@@ -227,7 +227,7 @@ def test_options_are_what_the_planner_knows():
 def test_a_round_tip_presses_harder_in_its_middle_and_moves_less(run):
     """The film stiffens, so that the same force moves the impedance less where it is not spread evenly."""
     words = ["predict", "tri", "--drawn", "--force", "0:6:6", "--position", "50", "--json"]
-    even, round_ = (json.loads(run(*words, "--profile", name).out) for name in ("uniform", "parabola"))
+    even, round_ = (run(*words, "--profile", name).json for name in ("uniform", "parabola"))
     assert (even["profile"], round_["profile"]) == ("uniform", "parabola")
     moved = [found["im_ohm"][0][1][0] - found["im_ohm"][0][0][0] for found in (even, round_)]
     assert 0.9 < moved[1] / moved[0] < 1.0
@@ -237,7 +237,7 @@ def test_a_round_tip_presses_harder_in_its_middle_and_moves_less(run):
 def test_a_round_tip_touches_over_a_length_that_grows(run):
     """On a bed eight times the force is twice the length; a flat tip has no radius."""
     words = (*FREE, "--position", "50", "--profile", "parabola", "--tip-radius", "20")
-    one, eight = (json.loads(run(*words, "--force", force, "--json").out)["contact_mm"] for force in ("0.5", "4"))
+    one, eight = (run(*words, "--force", force, "--json").json["contact_mm"] for force in ("0.5", "4"))
     assert eight == pytest.approx(2 * one, rel=1e-9)
     assert f"contact {eight:.3g} mm at 4 N" in run(*words, "--force", "4").out
     assert "has no radius" in run(*FREE, "--force", "1", "--tip-radius", "20").refusal

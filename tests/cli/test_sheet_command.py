@@ -36,7 +36,7 @@ def test_json_is_plain_and_holds_the_maps(run):
 def test_a_turned_sensor_is_the_same_sheet(run):
     """Ridges along x and along y; against the plate of 0.3 mm, docs/conduction.md has 0.846 and 0.706."""
     tri = ("sheet", "tri", "--size", "40x40", "--drawn", "--contacts", "corners", "--frequencies", "100kHz", "--json")
-    x, y = (json.loads(run(*tri, "--along", along).out) for along in "xy")
+    x, y = (run(*tri, "--along", along).json for along in "xy")
     plate = 0.042 / 0.3e-3
     assert x["sheet_resistance_ohm"]["top"] == pytest.approx(plate * np.sqrt(0.846 * 0.706), rel=1e-3)
     assert x["sheet_resistance_ohm"] == pytest.approx(y["sheet_resistance_ohm"])
@@ -51,16 +51,16 @@ def test_contacts_of_ones_own_are_the_same_as_those_with_a_name(run):
     corners = [w for x in ("0-6", "54-60") for y in ("0-6", "54mm-60mm") for w in ("--pad", f"{x},{y}")]
     edge = ["--pad", "0,0-60"]
     for own, name in ((corners, "corners"), (edge, "one-edge")):
-        found = json.loads(run(*WORDS, *own, "--contacts", name, "--json").out)["contacts"]
+        found = run(*WORDS, *own, "--contacts", name, "--json").json["contacts"]
         assert set(found) == {"pads", name}
         assert found["pads"]["sigma_force_n"][1] == pytest.approx(found[name]["sigma_force_n"][1], rel=1e-6)
         assert found["pads"]["impedance_ohm"]["re"][0][0] == pytest.approx(found[name]["impedance_ohm"]["re"][0][0])
-    assert set(json.loads(run(*WORDS, *edge, "--json").out)["contacts"]) == {"pads"}
+    assert set(run(*WORDS, *edge, "--json").json["contacts"]) == {"pads"}
 
 
 def test_the_impedance_from_one_edge_is_that_of_the_line(run):
     """Unpressed: coth of both sheets and the film that the answer itself names."""
-    data = json.loads(run(*WORDS, "--contacts", "one-edge", "--json").out)
+    data = run(*WORDS, "--contacts", "one-edge", "--json").json
     r = sum(data["sheet_resistance_ohm"].values()) / data["width_m"]
     for k, hertz in enumerate((1e5, 1e6)):
         y = 2j * np.pi * hertz * data["capacitance_f_per_m2"] * data["width_m"]

@@ -52,7 +52,7 @@ def test_a_design_is_sliced(run, contents, tmp_path):
     found = json.loads((tmp_path / "out/a/a.prusa.gcode.json").read_text())
     assert found["slicer"] == {"name": "prusa", "version": "2.5.0"}
     assert run("gcode", "check", "out/a/a.prusa.gcode").code == 0
-    assert json.loads(run("slice", *SMALL, "--name", "a", "--json").out)["tools"][0]["tool"] == 3
+    assert run("slice", *SMALL, "--name", "a", "--json").json["tools"][0]["tool"] == 3
 
 
 @pytest.mark.usefixtures("good")
