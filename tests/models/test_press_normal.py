@@ -38,10 +38,11 @@ def box(left, right, low, high):
     return rectangle(left, right, BASE + low, BASE + high)
 
 
-def pillars(gap):
-    """Half a pillar 0.45 mm wide and 0.5 high, half of a gap before a mirror."""
+def pillars(gap, count=1):
+    """Half a pillar 0.45 mm wide and 0.5 high before a mirror, or two halves ``gap`` apart."""
     period = 0.45 + gap
-    return cell_of(0.5, 0.5 * period, period, *(box(k + gap / 2, k + 0.45 + gap / 2, 0, 0.5) for k in (0, period)))
+    bars = [box(k * period + gap / 2, (k + 1) * period - gap / 2, 0, 0.5) for k in range(3)]
+    return cell_of(0.5, 0.5 * period, (0.5 + count / 2) * period, *bars)
 
 
 def solved(cell, stresses, held=None, fineness=None):
@@ -65,9 +66,16 @@ def test_faces_that_run_through_each_other_are_caught(monkeypatch):
         return pairs.some(np.zeros(len(pairs.point), bool))
 
     monkeypatch.setattr(contact.Faces, "project", blind)
-    found, _ = solved(pillars(0.05), np.linspace(0, 4e5, 9))
-    assert found.faults[0].startswith("converged up to")
-    assert found.converged_pa < 4e5  # they touch at 120 kPa
+    for count in (1, 2):  # beyond a mirror, and inside two bodies
+        found, _ = solved(pillars(0.05, count), np.linspace(0, 4e5, 9))
+        assert found.faults[0].startswith("converged up to")
+        assert found.converged_pa < 4e5  # they touch at 120 kPa
+
+
+def test_two_pillars_that_bulge_into_each_other_are_one_before_a_mirror():
+    one, two = (solved(pillars(0.05, count), [0.0, 2e5, 4e5], fineness=ROUGH)[0] for count in (1, 2))
+    assert one.faults == two.faults == ()
+    assert two.displacement_m == pytest.approx(one.displacement_m, rel=2e-3)
 
 
 def test_the_capacitance_is_continuous_where_pillars_meet():
