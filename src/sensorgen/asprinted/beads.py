@@ -13,7 +13,7 @@ import shapely
 from numpy.typing import NDArray
 
 from sensorgen.checks.estimate import ROUND
-from sensorgen.core.arrays import Columns, Real, Whole, parts_of
+from sensorgen.core.arrays import ColumnRecord, Real, Whole, parts_of
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.motion import Paths, follow, paths_of
@@ -34,7 +34,7 @@ _LEVEL_MM = 0.01  # a line belongs to a layer whose top it is this near
 
 
 @dataclass(frozen=True, eq=False)
-class Beads(Columns):
+class Beads(ColumnRecord):
     """The lines of one piece, from its corner [mm]; ``body`` counts in the bodies of its scene.
 
     Attributes

@@ -45,7 +45,7 @@ def grid_findings(scene: Scene, layers: Layers) -> Iterator[Finding]:
 
 def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
     levels = faces_mm(body)
-    off = sorted(z for z in levels if min(abs(z - b) for b in layers.boundaries_mm) > TOUCH_MM)
+    off = sorted(z for z in levels if layers.off_grid_mm(z) > TOUCH_MM)
     if not off:
         return
     low, high = min(levels), max(levels)

@@ -47,6 +47,10 @@ class Layers:
         """Height at which a face drawn at ``z_mm`` comes out: the boundary after the last sample up to it [mm]."""
         return self.boundaries_mm[min(bisect_left(self.mids_mm, z_mm + TOUCH_MM), len(self))]
 
+    def off_grid_mm(self, z_mm: float) -> float:
+        """Distance of a height from the nearest boundary [mm]."""
+        return min(abs(z_mm - b) for b in self.boundaries_mm)
+
 
 class Slices:
     """Every body in every layer: cut once, asked by all rules. Layers are counted from 0."""

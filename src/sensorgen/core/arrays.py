@@ -13,7 +13,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class ColumnRecord:
     """A record of arrays that are as long as each other, perhaps with other fields."""
 
     def of(self, rows: Mask | Whole | slice) -> Self:

@@ -127,9 +127,7 @@ def slices(section: Section, height_mm: float, *, layered: bool = False) -> list
 def mirrored(slices: tuple[Slice, ...], evenly: bool = True) -> SectionCell:
     """The smallest run of slices that mirrors at its own two sides continue to all of them."""
     whole = straightened(slices)
-    # A mirror may stand between slices, and in the middle of level ones
-    edges, end = {whole[0].left_mm, *(s.right_mm for s in whole)}, whole[-1].right_mm
-    places = sorted(edges | {(s.left_mm + s.right_mm) / 2 for s in whole if s.is_flat()})
+    places, end = _mirror_places(whole), whole[-1].right_mm
     is_mirror = cache(partial(_is_mirror, whole))
     for fits in (_is_even, _has_room) if evenly else (_shows_periods, _is_even, _has_room):
         for low, high in _pairs(places, end):
@@ -222,6 +220,12 @@ def _has_room(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
 def _shows_periods(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
     """True for two whole periods: in one alone, any place within its level ends may be the mirror."""
     return start_mm + 4 * piece_mm <= whole_mm + ROUNDING_MM
+
+
+def _mirror_places(whole: Sequence[Slice]) -> list[float]:
+    """Places at which a mirror may stand: between slices, and in the middle of level ones [mm]."""
+    edges = {whole[0].left_mm, *(s.right_mm for s in whole)}
+    return sorted(edges | {(s.left_mm + s.right_mm) / 2 for s in whole if s.is_flat()})
 
 
 def _pairs(places: list[float], end_mm: float) -> Iterator[Point]:

@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 import shapely
 
-from sensorgen.core.arrays import Columns, Mask, Real, Whole, parts_of
+from sensorgen.core.arrays import ColumnRecord, Mask, Real, Whole, parts_of
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode.motion import Numbering, follow, paths_of, tools_of
@@ -40,7 +40,7 @@ _Trees = Callable[["_Level"], shapely.STRtree]
 
 
 @dataclass(frozen=True, eq=False)
-class PrintedLines(Columns):
+class PrintedLines(ColumnRecord):
     """Printed lines of the bodies as rectangles in plan, half a width longer at both ends.
 
     Attributes
@@ -62,7 +62,7 @@ class PrintedLines(Columns):
 
 
 @dataclass(frozen=True, eq=False)
-class MovePieces(Columns):
+class MovePieces(ColumnRecord):
     """Straight pieces of moves.
 
     Attributes

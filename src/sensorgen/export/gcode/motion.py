@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from sensorgen.core.arrays import Columns, Mask, Real, Whole
+from sensorgen.core.arrays import ColumnRecord, Mask, Real, Whole
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import words
 from sensorgen.export.gcode.moves import (
@@ -216,7 +216,7 @@ NOT_MODEL = frozenset(
 
 
 @dataclass(frozen=True, eq=False)
-class Paths(Columns):
+class Paths(ColumnRecord):
     """One row per move that extrudes; arcs stand as chords, retractions and their return count for nothing.
 
     Attributes

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sensorgen.core.arrays import Columns, Mask, Real, Whole, parts_of
+from sensorgen.core.arrays import ColumnRecord, Mask, Real, Whole, parts_of
 from sensorgen.design.printer import MaxSpeed
 from sensorgen.export.gcode.words import Command
 
@@ -20,7 +20,7 @@ _FULL = 1e-9  # a turn below this is a full circle [rad]
 
 
 @dataclass(frozen=True, eq=False)
-class Arcs(Columns):
+class Arcs(ColumnRecord):
     """Moves that are arcs.
 
     Attributes

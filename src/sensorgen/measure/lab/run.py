@@ -203,18 +203,25 @@ def run(
     plan = planned(experiment, log)
     if next_press is None and any(part.kind == "next" for part in experiment.plan):
         raise BadInput("plan: a part 'next' needs a model of the specimen; expected other parts here")
-    if watchdog and not isinstance(rig.actuator, SelfLifting) and experiment.limits.force_n > UNWATCHED_N:
-        raise BadInput(
-            f"limits.force_n: {experiment.limits.force_n:g} N, and this actuator has no watchdog: if run and guardian "
-            f"end together, the tip stays down; expected up to {UNWATCHED_N:g} N, or --no-watchdog"
-        )
+    if watchdog:
+        _check_watchdog(experiment, rig)
     recorder.recover(log, clock)
     folder = resume or recorder.new_folder(log.path)
     with recorder.alone(folder) as ours:
         if not ours:
             raise BadInput(f"{str(folder)!r} is a run that goes on in another process; expected one that has ended")
         attempt = _Attempt(plan, clock, log, rig, folder, simulated, next_press, confirm, watchdog)
-        return attempt.result(view, guardian, predicted)
+        controls = Controls(view.commands) if view else Controls()
+        return attempt.result(view, controls, guardian, predicted)
+
+
+def _check_watchdog(experiment: Experiment, rig: RunDevices) -> None:
+    """Refuse forces that would stay on the specimen if run and guardian ended together."""
+    if not isinstance(rig.actuator, SelfLifting) and experiment.limits.force_n > UNWATCHED_N:
+        raise BadInput(
+            f"limits.force_n: {experiment.limits.force_n:g} N, and this actuator has no watchdog: if run and guardian "
+            f"end together, the tip stays down; expected up to {UNWATCHED_N:g} N, or --no-watchdog"
+        )
 
 
 class _Attempt:
@@ -231,7 +238,9 @@ class _Attempt:
         self.pressed = _pressed(before, plan.steps)
         self.identities: dict[str, Identity] = {}
 
-    def result(self, view: RunView | None, guardian: Guardian | None, predicted: Predicted | None) -> RunResult:
+    def result(
+        self, view: RunView | None, controls: Controls, guardian: Guardian | None, predicted: Predicted | None
+    ) -> RunResult:
         """Do it."""
         experiment = self.plan.experiment
         tones = np.array(experiment.readout.tones_hz)
@@ -239,7 +248,6 @@ class _Attempt:
         recorder.trim(self.folder / recorder.JOURNAL)
         recording = Recorder(self.folder, stem, tones, self.clock)
         self._begin(recording, stem)
-        controls = Controls(view.commands) if view else Controls()
         loop = Loop(
             self.rig, self.clock, recording, experiment, controls, Watch(tones), view, guardian, predicted,
             steps=len(self.plan.steps),

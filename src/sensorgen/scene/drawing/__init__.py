@@ -343,11 +343,7 @@ def svg(
         *(part for panel in details for part in panels.lettered(panel, letters, materials, printed)),
         mark,
         *on_detail(shown, details, grid, taken),
-        *(
-            part
-            for detail, whole, name in zip(details, wholes, NAMES, strict=False)
-            for part in panels.draw_whole(detail, whole, name, scene, materials)
-        ),
+        *_overview(scene, details, wholes, materials),
         *on_overview(shown, details, wholes),
         *listed(entries, marked, LEFT + 2, FOOT + 3.5, SPLIT - LEFT - 5),
         line("frame", 6, FOOT - 2, WIDTH - 6, FOOT - 2) + line("frame", SPLIT, FOOT - 2, SPLIT, HEIGHT - 6),
@@ -373,6 +369,14 @@ def _nearest(details: Sequence[ViewPanel]) -> tuple[Gap, ViewPanel] | None:
     """Smallest gap of two terminals in any view, and the view that shows it."""
     gaps = [(measured, panel) for panel in details if (measured := nearest(panel.view))]
     return min(gaps, key=lambda pair: round(pair[0].value_mm, 6), default=None)
+
+
+def _overview(
+    scene: Scene, details: Sequence[ViewPanel], wholes: Sequence[ViewPanel], colours: Colours
+) -> Iterator[str]:
+    """The whole length of each section."""
+    for detail, whole, name in zip(details, wholes, NAMES, strict=False):
+        yield from panels.draw_whole(detail, whole, name, scene, colours)
 
 
 def _sections(details: Sequence[ViewPanel], lanes: Lanes, grid: Sequence[float], colours: Colours) -> Iterator[str]:

@@ -179,8 +179,7 @@ class Gap:
 
 def heights(views: Sequence[View], height_mm: float) -> list[list[Measure]]:
     """Vertical measures in lanes from the sensor outwards: level by level, whole bodies, the whole."""
-    heights_of = [by_key((body.name, z) for body, outline in view.regions for _, z in outline) for view in views]
-    spans = [(min(zs), max(zs)) for by_body in heights_of for zs in by_body.values()]  # of each body
+    spans = [span for view in views for span in _extents(view)]
     levels = distinct([0.0, height_mm, *(z for view in views for z in _levels(view))], SAME_MM)
     if len(levels) > MOST_LEVELS:
         levels = distinct([0.0, height_mm, *chain.from_iterable(spans)], SAME_MM)
@@ -288,6 +287,12 @@ def _levels(view: View) -> Iterator[float]:
             turns = (before[1] - z) * (after[1] - z) > 0 and view.start_mm + SAME_MM < u < view.end_mm - SAME_MM
             if flat or turns:
                 yield z
+
+
+def _extents(view: View) -> Iterator[Point]:
+    """Lowest and highest place of each body [mm]."""
+    by_body = by_key((body.name, z) for body, outline in view.regions for _, z in outline)
+    return ((min(zs), max(zs)) for zs in by_body.values())
 
 
 def _reach(view: View, at_mm: float | None, end: Callable[..., float]) -> float:
