@@ -227,6 +227,8 @@ class _Rim:
     ----------
     around : dict of int to Fan
         Triangles at each corner.
+    walls, top : list of edge
+        Mirrors, and the electrode at 1 V.
     loops : dict of int to int
         Of each point on it, the least of those that its edges join it to.
     starts : set of int
@@ -234,29 +236,38 @@ class _Rim:
     """
 
     around: dict[int, Fan]
+    walls: list[Edge]
+    top: list[Edge]
     loops: dict[int, int]
     starts: set[int]
+
+    @classmethod
+    def of(cls, mesh: Triangles) -> "_Rim":
+        """Boundary of a mesh."""
+        around = {corner: one[0] for corner, one in fans(mesh.triangles).items()}
+        edges = [(corner, fan.spokes[0]) for corner, fan in around.items() if not fan.closed]
+        walls = [e for e in edges if _named(e) not in mesh.terminals]
+        top = [e for e in edges if mesh.terminals.get(_named(e)) == "top"]
+        starts = {a for a, b in edges if _named((a, b)) in mesh.terminals}
+        return cls(around, walls, top, _groups(edges), starts)
 
 
 def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
     """Mirrors, cuts and electrode of a mesh whose every corner has one fan; cuts keep away from cones."""
-    around = {corner: one[0] for corner, one in fans(mesh.triangles).items()}
-    edges = [(corner, fan.spokes[0]) for corner, fan in around.items() if not fan.closed]
-    rim = _Rim(around, _groups(edges), {a for a, b in edges if _named((a, b)) in mesh.terminals})
-    walls = [e for e in edges if _named(e) not in mesh.terminals]
-    top = [e for e in edges if mesh.terminals.get(_named(e)) == "top"]
-    mirrors, count = _groups(walls), HELD
+    rim = _Rim.of(mesh)
+    mirrors, count = _groups(rim.walls), HELD
     unknown_of: dict[int, int] = {}
     lifts: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    for piece in _connected(around):
+    for piece in _connected(rim.around):
         values, count = _on_mirrors(piece, mirrors, (piece & rim.loops.keys()) - set(cones), count)
         unknown_of |= values
         start = rim.loops[min(point for point, value in values.items() if value == 0)]
         for path in _cuts(rim, {k: rim.loops[k] for k in piece if k in rim.loops}, start, cones):
-            for number, corner in _beside(around, path):
+            for number, corner in _beside(rim.around, path):
                 lifts[number].append((corner, count))
             count += 1
-    return Flow(unknown_of, {_named(e) for e in walls}, dict(lifts), top, _rise(top, lifts, around), count)
+    rise = _rise(rim.top, lifts, rim.around)
+    return Flow(unknown_of, {_named(e) for e in rim.walls}, dict(lifts), rim.top, rise, count)
 
 
 def _connected(around: Mapping[int, Fan]) -> list[set[int]]:

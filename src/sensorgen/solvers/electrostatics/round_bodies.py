@@ -307,15 +307,12 @@ def _graded(cell: RoundCell, faces: Sequence[Any]) -> tuple[bool, list[tuple[flo
     """
     edges = [edge for face in faces for edge in face.edges if edge.mass > SAME_MM]  # poles have edges of no length
     along, ways = _graded_edges(cell, edges)
-    corners = {_key(vertex.p): vertex for edge in edges for vertex in edge.vertices}
-    marked = [
-        vertex
-        for place, vertex in corners.items()
-        if _is_corner(cell, place, ways.get(place, [])) and _is_open(cell, np.array(place))
-    ]
-    for vertex in marked:
-        vertex.hpref = 1
-    return bool(along or marked), along
+    is_graded = bool(along)
+    for place, vertex in {_key(vertex.p): vertex for edge in edges for vertex in edge.vertices}.items():
+        if _is_corner(cell, place, ways.get(place, [])) and _is_open(cell, np.array(place)):
+            vertex.hpref = 1
+            is_graded = True
+    return is_graded, along
 
 
 def _graded_edges(
