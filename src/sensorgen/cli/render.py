@@ -190,17 +190,24 @@ def pieces(
 
     if wanted == "json":
         return [document.to_json(result)]
-    if wanted == "csv" and hasattr(result, "csv"):
-        blocks: Iterable[str] = result.csv()
-        return blocks
     if wanted == "csv":
-        tables = [part for part in result.document() if isinstance(part, document.Table)]
-        if not tables:
-            raise BadInput("--csv: this result has no table; expected --json")
-        return [document.comma_separated(tables[0])]
+        return _comma_separated(result)
     words = document.markdown if wanted else document.text
     lines = words([*before, *(result.document() if shown is None else shown)])
     return (f"{line}\n" for line in lines)
+
+
+def _comma_separated(result: "Documented") -> Iterable[str]:
+    """A result's own CSV, or its first table."""
+    from sensorgen.core import document
+
+    if hasattr(result, "csv"):
+        blocks: Iterable[str] = result.csv()
+        return blocks
+    tables = [part for part in result.document() if isinstance(part, document.Table)]
+    if not tables:
+        raise BadInput("--csv: this result has no table; expected --json")
+    return [document.comma_separated(tables[0])]
 
 
 def _coloured(line: str) -> str:

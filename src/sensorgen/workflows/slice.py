@@ -1,6 +1,6 @@
 """A design to its G-code file: checked as a design, sliced, and checked again as G-code."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -116,22 +116,33 @@ def slice_design(
     if strict and whole.errors(strict) and not (force or report.refused):
         raise Unprintable(whole.findings, whole.errors(strict), whole.source)
     stem = f"{design.name}.{slicer}"
-    passed, refused = (f"{stem}.gcode", f"{stem}.gcode.json"), (f"{stem}.refused.gcode", f"{stem}.refused.json")
-    names, others = (refused, passed) if report.refused else (passed, refused)
+    names, others = _names(stem, refused=report.refused)
     result = SlicedFile(
         **vars(report), gcode=names[0], verdict=whole.verdict, all_findings=tuple(whole.findings),
         compensated=tuple(compensated),
     )  # fmt: skip
-    folder, page = out / design.name, _page(sliced, whole.findings)
-    store.replace(folder / names[0], sliced.content)
-    if compensated:
-        store.replace(folder / "design.json", json_bytes(design.model_dump(mode="json")))
-    store.replace(folder / names[1], document.to_json(result).encode())
-    if page:
-        store.replace(folder / f"{stem}.layers.html", page.encode())
+    changed = json_bytes(design.model_dump(mode="json")) if compensated else b""
+    folder = out / design.name
+    _put(folder, {
+        names[0]: sliced.content, "design.json": changed, names[1]: document.to_json(result).encode(),
+        f"{stem}.layers.html": _page(sliced, whole.findings).encode(),
+    }, others)  # fmt: skip
+    return replace(result, gcode=str(folder / names[0]))
+
+
+def _names(stem: str, *, refused: bool) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Names of G-code and record, and those that a run of the other outcome has left."""
+    passed, other = (f"{stem}.gcode", f"{stem}.gcode.json"), (f"{stem}.refused.gcode", f"{stem}.refused.json")
+    return (other, passed) if refused else (passed, other)
+
+
+def _put(folder: Path, files: Mapping[str, bytes], others: Sequence[str]) -> None:
+    """Put files that have content in place, and take away those that an earlier run has left under the other name."""
+    for name, content in files.items():
+        if content:
+            store.replace(folder / name, content)
     for old in others:
         (folder / old).unlink(missing_ok=True)
-    return replace(result, gcode=str(folder / names[0]))
 
 
 def _page(sliced: NewSlice, findings: Sequence[Finding]) -> str:
