@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import lru_cache
 from importlib.util import find_spec
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -20,7 +21,9 @@ from sensorgen.scene.layers import Region
 from sensorgen.scene.repetition import halved, repeat
 from sensorgen.scene.scene import SLIVER_MM, Body, Piece, Scene, dielectrics
 from sensorgen.solvers.electrostatics import bounds as fem
-from sensorgen.solvers.electrostatics.round_cell import RoundCell
+
+if TYPE_CHECKING:
+    from sensorgen.solvers.electrostatics.round_cell import RoundCell
 
 SOURCE = "Dirichlet's and Thomson's principles; curved tetrahedra, H1 and hybrid H(div) by NGSolve"
 COST = 3
@@ -96,7 +99,7 @@ def _at(scene: Scene, z_mm: float) -> Iterator[Region]:
 
 
 @lru_cache(maxsize=8)
-def cell(scene: Scene) -> tuple[RoundCell, tuple[str, ...]]:
+def cell(scene: Scene) -> tuple["RoundCell", tuple[str, ...]]:
     """The cell of a scene without permittivities, and the materials of its dielectrics.
 
     Raises
@@ -104,6 +107,8 @@ def cell(scene: Scene) -> tuple[RoundCell, tuple[str, ...]]:
     ValueError
         An electrode is missing, the pattern has no mirrors, or the cell has too many bodies.
     """
+    from sensorgen.solvers.electrostatics.round_cell import RoundCell
+
     bottom, top = _heights(scene, "bottom"), _heights(scene, "top")
     looks = list(_looks(scene))
     x, y = repeat(looks, scene.size_mm[:2], 0), repeat(looks, scene.size_mm[:2], 1)
