@@ -50,7 +50,7 @@ Made by `bench/press_round.py`: displacement and rise of C at 2 kPa; `press_roun
 
 def solid_3d(scene: Scene, fine_mm: float) -> tuple[float, float]:
     """Displacement [m] and rise [F/m2] in 3D."""
-    cell, _, _ = curved.cell(scene)
+    cell, _ = curved.cell(scene)
     whole = occ.Box(cell.low_mm, cell.high_mm)
     rest, shapes, terminals = whole, [], {}
     for piece, _ in cell.pieces:

@@ -105,7 +105,7 @@ def slope_m_per_pa(scene, solids, fine_mm):
 
     from sensorgen.solvers.electrostatics.round_bodies import solid
 
-    cell, _, _ = curved.cell(scene)
+    cell, _ = curved.cell(scene)
     shapes = []
     for piece, _ in cell.pieces:
         one = solid(piece) * occ.Box(cell.low_mm, cell.high_mm)
