@@ -53,10 +53,10 @@ FAILS = BadInput("does not converge")
 @pytest.mark.parametrize(
     ("allowed", "answers", "found", "asked"),
     [
-        (0.2, {"coarse": 0.2, "fine": 0.004}, 0.2, ["coarse"]),  # just near enough
+        (0.2, {"coarse": 0.2, "fine": 0.004}, 0.2, ["coarse"]),  # just accurate enough
         (0.2, {"coarse": 0.3, "fine": 0.004}, 0.004, ["coarse", "fine"]),  # an expectation that does not hold
         (0.05, {"coarse": 0.08, "fine": FAILS}, 0.08, ["fine", "coarse"]),
-        (0.05, {"coarse": 0.08, "fine": 0.06}, 0.06, ["fine"]),  # not near enough, and coarser ones are not asked
+        (0.05, {"coarse": 0.08, "fine": 0.06}, 0.06, ["fine"]),  # not accurate enough; coarser models are left out
     ],
 )
 def test_which_are_asked_and_which_answers(allowed, answers, found, asked):

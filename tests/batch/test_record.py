@@ -177,7 +177,7 @@ def test_verify_of_what_is_no_batch(tmp_path, content, said):
 
 
 def test_tabs_take_room_and_files_of_an_earlier_batch_go_and_others_stay(plan, tmp_path):
-    """Its labels have the head of the log, which proves what was in it before the print."""
+    """Labels have the head of the log, which proves what was in it before the print."""
     path = plan("labels: {tab: true}\n" + plan().read_text("utf-8"))
     folder = make(path, tmp_path / "out", gcode=False, log_head="0123456789abcdef" * 4).folder
     assert folder.joinpath("labels.html").read_text("utf-8").count("<p>log 0123456789abcdef</p>") == 3
